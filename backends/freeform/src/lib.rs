@@ -1,0 +1,1 @@
+//! The freeform back end.

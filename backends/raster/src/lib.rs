@@ -1,0 +1,1 @@
+//! The raster back end.

@@ -1,0 +1,1 @@
+//! The stylized back end.

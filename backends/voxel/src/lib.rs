@@ -1,0 +1,1 @@
+//! The voxel back end.

@@ -1,0 +1,418 @@
+//! Pictures: planes of color, distance, normal, id, albedo, shadow and coverage.
+
+use crate::parallel::Threads;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// One plane of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Linear RGB.
+    Color,
+    /// Euclidean distance from the eye (orthographic: from the picture plane) in meters; infinity = nothing.
+    Distance,
+    /// Unit normal in world space on the viewer's side; zero = nothing.
+    Normal,
+    /// Index of the object plus one; 0 = nothing.
+    Id,
+    /// Base color with texture, unlit.
+    Albedo,
+    /// Share of the scene's shadow-casting lights that reach the point and that it does not face away from:
+    /// 1 = all, 0 = none. 1 where nothing is seen.
+    Shadow,
+    /// Share of the pixel that objects cover.
+    Coverage,
+}
+
+impl Channel {
+    /// All channels.
+    pub const ALL: [Self; 7] =
+        [Self::Color, Self::Distance, Self::Normal, Self::Id, Self::Albedo, Self::Shadow, Self::Coverage];
+
+    /// Returns the name used on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Color => "color",
+            Self::Distance => "distance",
+            Self::Normal => "normal",
+            Self::Id => "id",
+            Self::Albedo => "albedo",
+            Self::Shadow => "shadow",
+            Self::Coverage => "coverage",
+        }
+    }
+}
+
+/// A set of channels. A channel that nobody asked for is neither computed nor stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Channels(u8);
+
+impl Channels {
+    /// No channel.
+    pub const NONE: Self = Self(0);
+    /// All channels.
+    pub const ALL: Self = Self(0x7f);
+    /// The color alone.
+    pub const COLOR: Self = Self(1);
+
+    /// Builds a set.
+    #[must_use]
+    pub fn of(channels: &[Channel]) -> Self {
+        channels.iter().fold(Self::NONE, |set, &c| set.with(c))
+    }
+
+    /// Returns the set with one more channel.
+    #[must_use]
+    pub const fn with(self, channel: Channel) -> Self {
+        Self(self.0 | 1 << channel as u8)
+    }
+
+    /// Tells whether a channel is in the set.
+    #[must_use]
+    pub const fn has(self, channel: Channel) -> bool {
+        self.0 >> channel as u8 & 1 == 1
+    }
+
+    /// Tells whether any channel but color is in the set.
+    #[must_use]
+    pub const fn has_geometry(self) -> bool {
+        self.0 & !1 != 0
+    }
+
+    /// Lists the channels.
+    pub fn iter(self) -> impl Iterator<Item = Channel> {
+        Channel::ALL.into_iter().filter(move |&c| self.has(c))
+    }
+}
+
+/// Everything a pixel can hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixel {
+    /// See [`Channel::Color`].
+    pub color: Vec3,
+    /// See [`Channel::Distance`].
+    pub distance: f32,
+    /// See [`Channel::Normal`].
+    pub normal: Vec3,
+    /// See [`Channel::Id`].
+    pub id: u32,
+    /// See [`Channel::Albedo`].
+    pub albedo: Vec3,
+    /// See [`Channel::Shadow`].
+    pub shadow: f32,
+    /// See [`Channel::Coverage`].
+    pub coverage: f32,
+}
+
+impl Pixel {
+    /// A pixel that sees nothing but a background color.
+    #[must_use]
+    pub const fn background(color: Vec3) -> Self {
+        Self {
+            color,
+            distance: f32::INFINITY,
+            normal: Vec3::ZERO,
+            id: 0,
+            albedo: Vec3::ZERO,
+            shadow: 1.0,
+            coverage: 0.0,
+        }
+    }
+}
+
+/// A picture with the channels that were asked for; planes of other channels are empty.
+#[derive(Clone, Debug)]
+pub struct Framebuffer {
+    width: u32,
+    height: u32,
+    channels: Channels,
+    color: Vec<Vec3>,
+    distance: Vec<f32>,
+    normal: Vec<Vec3>,
+    id: Vec<u32>,
+    albedo: Vec<Vec3>,
+    shadow: Vec<f32>,
+    coverage: Vec<f32>,
+}
+
+impl Framebuffer {
+    /// Builds an empty (black, infinitely far) picture.
+    #[must_use]
+    pub fn new(width: u32, height: u32, channels: Channels) -> Self {
+        let n = width as usize * height as usize;
+        let len = |c: Channel| if channels.has(c) { n } else { 0 };
+        Self {
+            width,
+            height,
+            channels,
+            color: vec![Vec3::ZERO; len(Channel::Color)],
+            distance: vec![f32::INFINITY; len(Channel::Distance)],
+            normal: vec![Vec3::ZERO; len(Channel::Normal)],
+            id: vec![0; len(Channel::Id)],
+            albedo: vec![Vec3::ZERO; len(Channel::Albedo)],
+            shadow: vec![1.0; len(Channel::Shadow)],
+            coverage: vec![0.0; len(Channel::Coverage)],
+        }
+    }
+
+    /// Returns the number of columns.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+    /// Returns the number of rows.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+    /// Returns the channels it holds.
+    #[must_use]
+    pub fn channels(&self) -> Channels {
+        self.channels
+    }
+    /// Returns the color plane, rows from the top.
+    #[must_use]
+    pub fn color(&self) -> &[Vec3] {
+        &self.color
+    }
+    /// Returns the distance plane.
+    #[must_use]
+    pub fn distance(&self) -> &[f32] {
+        &self.distance
+    }
+    /// Returns the normal plane.
+    #[must_use]
+    pub fn normal(&self) -> &[Vec3] {
+        &self.normal
+    }
+    /// Returns the id plane.
+    #[must_use]
+    pub fn id(&self) -> &[u32] {
+        &self.id
+    }
+    /// Returns the albedo plane.
+    #[must_use]
+    pub fn albedo(&self) -> &[Vec3] {
+        &self.albedo
+    }
+    /// Returns the shadow plane.
+    #[must_use]
+    pub fn shadow(&self) -> &[f32] {
+        &self.shadow
+    }
+    /// Returns the coverage plane.
+    #[must_use]
+    pub fn coverage(&self) -> &[f32] {
+        &self.coverage
+    }
+
+    /// Returns the bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (self.color.len() * 12
+            + self.normal.len() * 12
+            + self.albedo.len() * 12
+            + (self.distance.len() + self.id.len() + self.shadow.len() + self.coverage.len()) * 4)
+            as u64
+    }
+
+    /// Returns the whole picture as one band.
+    pub fn band(&mut self) -> Band<'_> {
+        Band {
+            width: self.width,
+            first_row: 0,
+            rows: self.height,
+            color: &mut self.color,
+            distance: &mut self.distance,
+            normal: &mut self.normal,
+            id: &mut self.id,
+            albedo: &mut self.albedo,
+            shadow: &mut self.shadow,
+            coverage: &mut self.coverage,
+        }
+    }
+
+    /// Draws the picture in bands of `rows` rows, in parallel; band borders lie at multiples of `rows`.
+    ///
+    /// Allocates nothing. The result does not depend on the number of threads as long as `draw` writes only
+    /// what follows from the band's place.
+    pub fn for_each_band(&mut self, threads: &dyn Threads, rows: u32, draw: &(impl Fn(Band<'_>) + Sync)) {
+        fn halve(threads: &dyn Threads, band: Band<'_>, rows: u32, draw: &(impl Fn(Band<'_>) + Sync)) {
+            if band.rows <= rows {
+                draw(band);
+                return;
+            }
+            let middle = band.rows.div_ceil(rows) / 2 * rows;
+            let (upper, lower) = band.split(middle);
+            let (mut upper, mut lower) = (Some(upper), Some(lower));
+            threads.join(
+                &mut || {
+                    if let Some(band) = upper.take() {
+                        halve(threads, band, rows, draw);
+                    }
+                },
+                &mut || {
+                    if let Some(band) = lower.take() {
+                        halve(threads, band, rows, draw);
+                    }
+                },
+            );
+        }
+        if self.width > 0 && self.height > 0 {
+            halve(threads, self.band(), rows.max(1), draw);
+        }
+    }
+
+    /// Compares all planes bit by bit; signs of zero and patterns of NaN count.
+    #[must_use]
+    pub fn same_bits(&self, other: &Self) -> bool {
+        let bits = |v: &[f32]| v.iter().map(|f| f.to_bits()).collect::<Vec<_>>();
+        let bits3 = |v: &[Vec3]| v.iter().map(|c| c.to_array().map(f32::to_bits)).collect::<Vec<_>>();
+        self.width == other.width
+            && self.height == other.height
+            && self.channels == other.channels
+            && self.id == other.id
+            && bits3(&self.color) == bits3(&other.color)
+            && bits(&self.distance) == bits(&other.distance)
+            && bits3(&self.normal) == bits3(&other.normal)
+            && bits3(&self.albedo) == bits3(&other.albedo)
+            && bits(&self.shadow) == bits(&other.shadow)
+            && bits(&self.coverage) == bits(&other.coverage)
+    }
+
+    /// Counts numbers that are not finite (infinite distances are the mark of nothing and do not count).
+    #[must_use]
+    pub fn count_not_finite(&self) -> usize {
+        let wild = |v: &[Vec3]| v.iter().filter(|c| !c.is_finite()).count();
+        wild(&self.color)
+            + wild(&self.normal)
+            + wild(&self.albedo)
+            + self.distance.iter().filter(|d| d.is_nan() || **d < 0.0).count()
+            + self.shadow.iter().chain(&self.coverage).filter(|v| !v.is_finite()).count()
+    }
+}
+
+/// Some rows of a picture, to be written by one thread. Planes that were not asked for are empty.
+pub struct Band<'a> {
+    /// Number of columns.
+    pub width: u32,
+    /// Row of the picture at which the band begins.
+    pub first_row: u32,
+    /// Number of rows.
+    pub rows: u32,
+    /// Color, rows from the top of the band.
+    pub color: &'a mut [Vec3],
+    /// Distance.
+    pub distance: &'a mut [f32],
+    /// Normal.
+    pub normal: &'a mut [Vec3],
+    /// Id.
+    pub id: &'a mut [u32],
+    /// Albedo.
+    pub albedo: &'a mut [Vec3],
+    /// Shadow.
+    pub shadow: &'a mut [f32],
+    /// Coverage.
+    pub coverage: &'a mut [f32],
+}
+
+impl<'a> Band<'a> {
+    /// Cuts the band before a row, counted from its first.
+    #[must_use]
+    pub fn split(self, row: u32) -> (Self, Self) {
+        fn cut<T>(plane: &mut [T], at: usize) -> (&mut [T], &mut [T]) {
+            let at = at.min(plane.len());
+            plane.split_at_mut(at)
+        }
+        let at = row as usize * self.width as usize;
+        let (color, color2) = cut(self.color, at);
+        let (distance, distance2) = cut(self.distance, at);
+        let (normal, normal2) = cut(self.normal, at);
+        let (id, id2) = cut(self.id, at);
+        let (albedo, albedo2) = cut(self.albedo, at);
+        let (shadow, shadow2) = cut(self.shadow, at);
+        let (coverage, coverage2) = cut(self.coverage, at);
+        let width = self.width;
+        (
+            Band {
+                width,
+                first_row: self.first_row,
+                rows: row,
+                color,
+                distance,
+                normal,
+                id,
+                albedo,
+                shadow,
+                coverage,
+            },
+            Band {
+                width,
+                first_row: self.first_row + row,
+                rows: self.rows - row,
+                color: color2,
+                distance: distance2,
+                normal: normal2,
+                id: id2,
+                albedo: albedo2,
+                shadow: shadow2,
+                coverage: coverage2,
+            },
+        )
+    }
+
+    /// Writes a pixel into all planes that are there; `row` counts from the first row of the band.
+    pub fn put(&mut self, x: u32, row: u32, pixel: &Pixel) {
+        let i = row as usize * self.width as usize + x as usize;
+        if let Some(v) = self.color.get_mut(i) {
+            *v = pixel.color;
+        }
+        if let Some(v) = self.distance.get_mut(i) {
+            *v = pixel.distance;
+        }
+        if let Some(v) = self.normal.get_mut(i) {
+            *v = pixel.normal;
+        }
+        if let Some(v) = self.id.get_mut(i) {
+            *v = pixel.id;
+        }
+        if let Some(v) = self.albedo.get_mut(i) {
+            *v = pixel.albedo;
+        }
+        if let Some(v) = self.shadow.get_mut(i) {
+            *v = pixel.shadow;
+        }
+        if let Some(v) = self.coverage.get_mut(i) {
+            *v = pixel.coverage;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parallel::{OneThread, Pool};
+
+    #[test]
+    fn bands_cover_every_row_once() {
+        let pool = Pool::new(2).unwrap();
+        for (width, height) in [(0, 0), (1, 1), (7, 1), (1, 131), (13, 97)] {
+            for threads in [&OneThread as &dyn Threads, &pool] {
+                let mut picture = Framebuffer::new(width, height, Channels::of(&[Channel::Id]));
+                picture.for_each_band(threads, 16, &|mut band| {
+                    assert_eq!(band.first_row % 16, 0);
+                    for row in 0..band.rows {
+                        for x in 0..band.width {
+                            let id = (band.first_row + row) * band.width + x + 1;
+                            band.put(x, row, &Pixel { id, ..Pixel::background(Vec3::ZERO) });
+                        }
+                    }
+                });
+                assert!(picture.id().iter().enumerate().all(|(i, &id)| id as usize == i + 1));
+                assert!(picture.color().is_empty());
+            }
+        }
+    }
+}

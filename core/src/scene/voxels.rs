@@ -1,0 +1,245 @@
+//! A grid of palette bytes in copy-on-write chunks.
+
+use crate::math::Aabb;
+use glam::DVec3;
+use std::sync::Arc;
+
+/// Edge of a chunk in cells.
+pub const CHUNK: u32 = 64;
+
+/// A grid of any size; cell `(x, y, z)` fills `[x, x+1] x [y, y+1] x [z, z+1]` in object space.
+///
+/// Byte 0 is empty; byte `v` has the material of slot `v - 1`. Cells live in chunks of 64^3 that clones
+/// share until one of them is edited.
+#[derive(Clone, Debug)]
+pub struct Voxels {
+    size: [u32; 3],
+    chunks_per_axis: [u32; 3],
+    chunks: Vec<Chunk>,
+}
+
+/// 64^3 cells.
+#[derive(Clone, Debug)]
+pub enum Chunk {
+    /// All cells hold this byte.
+    Uniform(u8),
+    /// One byte a cell, x fastest, then y, then z.
+    Cells(Arc<[u8]>),
+}
+
+const CHUNK_CELLS: usize = (CHUNK * CHUNK * CHUNK) as usize;
+
+impl Voxels {
+    /// Builds an empty grid.
+    ///
+    /// # Panics
+    /// When the number of chunks does not fit into memory's address range; loaders check sizes before.
+    #[must_use]
+    pub fn new(size: [u32; 3]) -> Self {
+        let chunks_per_axis = size.map(|s| s.div_ceil(CHUNK));
+        let count = chunks_per_axis.iter().map(|&c| c as usize).product();
+        Self { size, chunks_per_axis, chunks: vec![Chunk::Uniform(0); count] }
+    }
+
+    /// Builds a grid from bytes, x fastest, then y, then z.
+    ///
+    /// # Panics
+    /// When the number of bytes is not the product of the sizes.
+    #[must_use]
+    pub fn from_bytes(size: [u32; 3], bytes: &[u8]) -> Self {
+        let [nx, ny, nz] = size.map(|s| s as usize);
+        assert_eq!(bytes.len(), nx * ny * nz, "bytes of a {nx}x{ny}x{nz} grid");
+        Self::from_fn(size, |x, y, z| bytes[(z as usize * ny + y as usize) * nx + x as usize])
+    }
+
+    /// Builds a grid by asking for each cell's byte.
+    #[must_use]
+    pub fn from_fn(size: [u32; 3], cell: impl Fn(u32, u32, u32) -> u8) -> Self {
+        let mut grid = Self::new(size);
+        for index in 0..grid.chunks.len() {
+            let first = grid.chunk_origin(index);
+            let mut bytes = vec![0u8; CHUNK_CELLS];
+            for z in 0..CHUNK.min(size[2] - first[2]) {
+                for y in 0..CHUNK.min(size[1] - first[1]) {
+                    for x in 0..CHUNK.min(size[0] - first[0]) {
+                        bytes[cell_index(x, y, z)] = cell(first[0] + x, first[1] + y, first[2] + z);
+                    }
+                }
+            }
+            grid.chunks[index] =
+                if bytes.iter().all(|&b| b == 0) { Chunk::Uniform(0) } else { Chunk::Cells(bytes.into()) };
+        }
+        grid
+    }
+
+    /// Returns the number of cells along each axis.
+    #[must_use]
+    pub fn size(&self) -> [u32; 3] {
+        self.size
+    }
+
+    /// Returns the number of chunks along each axis.
+    #[must_use]
+    pub fn chunks_per_axis(&self) -> [u32; 3] {
+        self.chunks_per_axis
+    }
+
+    /// Returns the chunks, x fastest, then y, then z.
+    #[must_use]
+    pub fn chunks(&self) -> &[Chunk] {
+        &self.chunks
+    }
+
+    /// Returns the first cell of a chunk.
+    #[must_use]
+    pub fn chunk_origin(&self, index: usize) -> [u32; 3] {
+        let [cx, cy, _] = self.chunks_per_axis.map(|c| c as usize);
+        [index % cx, index / cx % cy, index / (cx * cy)].map(|c| c as u32 * CHUNK)
+    }
+
+    /// Returns the byte of a cell; cells outside are empty.
+    #[must_use]
+    pub fn get(&self, x: u32, y: u32, z: u32) -> u8 {
+        if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] {
+            return 0;
+        }
+        match &self.chunks[self.chunk_index(x, y, z)] {
+            Chunk::Uniform(value) => *value,
+            Chunk::Cells(cells) => cells[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)],
+        }
+    }
+
+    /// Sets the byte of a cell; cells outside are left alone.
+    pub fn set(&mut self, x: u32, y: u32, z: u32, value: u8) {
+        if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] || self.get(x, y, z) == value {
+            return;
+        }
+        let index = self.chunk_index(x, y, z);
+        let chunk = &mut self.chunks[index];
+        if let Chunk::Uniform(all) = *chunk {
+            *chunk = Chunk::Cells(vec![all; CHUNK_CELLS].into());
+        }
+        let Chunk::Cells(cells) = chunk else { unreachable!("the chunk was just given cells") };
+        Arc::make_mut(cells)[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)] = value;
+    }
+
+    fn chunk_index(&self, x: u32, y: u32, z: u32) -> usize {
+        let [cx, cy, _] = self.chunks_per_axis.map(|c| c as usize);
+        ((z / CHUNK) as usize * cy + (y / CHUNK) as usize) * cx + (x / CHUNK) as usize
+    }
+
+    /// Bounds the whole grid, empty cells included.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        if self.size.contains(&0) {
+            return Aabb::EMPTY;
+        }
+        Aabb::new(DVec3::ZERO, DVec3::from_array(self.size.map(f64::from)))
+    }
+
+    /// Calls `visit` for every filled cell, chunk by chunk.
+    pub fn for_each_filled(&self, mut visit: impl FnMut([u32; 3], u8)) {
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            if matches!(chunk, Chunk::Uniform(0)) {
+                continue;
+            }
+            let first = self.chunk_origin(index);
+            let end: [u32; 3] = std::array::from_fn(|a| CHUNK.min(self.size[a] - first[a]));
+            for z in 0..end[2] {
+                for y in 0..end[1] {
+                    for x in 0..end[0] {
+                        let value = match chunk {
+                            Chunk::Uniform(value) => *value,
+                            Chunk::Cells(cells) => cells[cell_index(x, y, z)],
+                        };
+                        if value != 0 {
+                            visit([first[0] + x, first[1] + y, first[2] + z], value);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Returns the number of filled cells.
+    #[must_use]
+    pub fn filled(&self) -> u64 {
+        let mut count = 0;
+        self.for_each_filled(|_, _| count += 1);
+        count
+    }
+
+    /// Lists the filled cells whose byte is wanted and that have at least one empty neighbor.
+    pub fn exposed_where(&self, wanted: impl Fn(u8) -> bool) -> Vec<([u32; 3], u8)> {
+        let wanted: [bool; 256] = std::array::from_fn(|v| v != 0 && wanted(v as u8));
+        let mut cells = Vec::new();
+        if wanted.contains(&true) {
+            self.for_each_filled(|[x, y, z], value| {
+                let open = |dx: i32, dy: i32, dz: i32| {
+                    self.get(x.wrapping_add_signed(dx), y.wrapping_add_signed(dy), z.wrapping_add_signed(dz))
+                        == 0
+                };
+                if wanted[usize::from(value)]
+                    && (open(1, 0, 0)
+                        || open(-1, 0, 0)
+                        || open(0, 1, 0)
+                        || open(0, -1, 0)
+                        || open(0, 0, 1)
+                        || open(0, 0, -1))
+                {
+                    cells.push(([x, y, z], value));
+                }
+            });
+        }
+        cells
+    }
+
+    /// Returns the bytes held, chunks shared with clones counted in full.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.chunks
+            .iter()
+            .map(|c| match c {
+                Chunk::Uniform(_) => 16,
+                Chunk::Cells(cells) => cells.len() as u64 + 16,
+            })
+            .sum()
+    }
+}
+
+/// Returns where a cell lies in [`Chunk::Cells`]; coordinates are within the chunk.
+fn cell_index(x: u32, y: u32, z: u32) -> usize {
+    ((z * CHUNK + y) * CHUNK + x) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_read_back_over_chunk_borders() {
+        let size = [65, 3, 130];
+        let value = |x: u32, y: u32, z: u32| ((x * 7 + y * 5 + z * 3) % 251) as u8;
+        let grid = Voxels::from_fn(size, value);
+        for z in 0..size[2] {
+            for y in 0..size[1] {
+                for x in 0..size[0] {
+                    assert_eq!(grid.get(x, y, z), value(x, y, z));
+                }
+            }
+        }
+        assert_eq!(grid.get(65, 0, 0), 0);
+    }
+
+    #[test]
+    fn an_edit_leaves_the_clone_alone_and_shares_the_rest() {
+        let before = Voxels::from_fn([128, 64, 64], |_, _, _| 1);
+        let mut after = before.clone();
+        after.set(3, 4, 5, 9);
+        assert_eq!((before.get(3, 4, 5), after.get(3, 4, 5)), (1, 9));
+        let (Chunk::Cells(a), Chunk::Cells(b)) = (&before.chunks()[1], &after.chunks()[1]) else {
+            panic!("both chunks hold cells");
+        };
+        assert!(Arc::ptr_eq(a, b), "the chunk that was not edited is shared");
+    }
+}
