@@ -1,13 +1,30 @@
 //! Turns any shape into triangles, voxels or a signed-distance grid: on demand, to a stated tolerance, once
 //! for all back ends, and with the error bound that was reached.
+//!
+//! Nothing is converted that no one asked for. Tolerances are grouped in classes half an octave wide; a
+//! result is kept under (shape, class) as long as the shape lives, and shared by all who ask again.
 
-use crate::scene::{Material, Mesh, Scene, Voxels};
+mod distance;
+mod field_mesh;
+mod height_mesh;
+mod palette;
+mod primitive_mesh;
+mod voxel_mesh;
+mod voxelize;
+
+use crate::parallel::Threads;
+use crate::scene::{Material, Mesh, Object, Scene, Shape, Voxels};
 use glam::{DAffine3, DVec3};
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// Converts shapes and keeps the results for all back ends.
 #[derive(Default)]
-pub struct Converter {}
+pub struct Converter {
+    meshes: Cache<MeshModel>,
+    voxels: Cache<VoxelModel>,
+    distances: Cache<DistanceModel>,
+}
 
 /// What a conversion would make, told without making it.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,9 +73,9 @@ pub struct DistanceModel {
     pub first: DVec3,
     /// Distance of neighboring samples, object space, the same along all axes.
     pub step: f64,
-    /// Signed distances in object space, clamped to a band of a few steps around the surface.
+    /// Signed distances in object space, clamped to [`DistanceModel::BAND`] steps around the surface.
     pub distances: Vec<f32>,
-    /// For each sample the index into `palette` of the nearest surface.
+    /// For each sample the byte `v` whose material `palette[v - 1]` the nearest surface has; 0 far from any.
     pub colors: Vec<u8>,
     /// Materials of the surface.
     pub palette: Vec<Material>,
@@ -66,6 +83,11 @@ pub struct DistanceModel {
     pub bound: f64,
     /// What was done, for the report.
     pub why: String,
+}
+
+impl DistanceModel {
+    /// Distances are exact up to this many steps from the surface and clamped beyond.
+    pub const BAND: f64 = 3.0;
 }
 
 /// Why a shape could not be converted.
@@ -76,4 +98,329 @@ pub struct ConvertError {
     pub object: String,
     /// What is in the way.
     pub reason: String,
+}
+
+/// How fine a conversion shall be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detail {
+    /// Greatest distance between the surfaces, world space.
+    pub tolerance: f64,
+    /// Most cells along the longest edge; where the tolerance would need more, the bound says what was reached.
+    pub max_resolution: u32,
+}
+
+impl Converter {
+    /// Returns the shape of an object as triangles. Meshes are returned as they are.
+    ///
+    /// # Errors
+    /// When the shape has no surface at all.
+    pub fn mesh(
+        &self,
+        scene: &Scene,
+        object: &Object,
+        detail: Detail,
+        threads: &dyn Threads,
+    ) -> Result<Arc<MeshModel>, ConvertError> {
+        let scale = scale_of(object);
+        self.meshes.get(scene, object, detail, |detail| {
+            let tolerance = detail.tolerance / scale;
+            let (mesh, bound, why) = match &*object.shape {
+                Shape::Mesh(mesh) => (mesh.clone(), 0.0, "triangles as given".to_owned()),
+                Shape::Primitive(primitive) => {
+                    let (mesh, bound) = primitive_mesh::tessellate(primitive, tolerance);
+                    let why = format!("{} triangles", mesh.triangles.len());
+                    (mesh, bound, why)
+                }
+                Shape::Voxels(voxels) => {
+                    let clear = clear_values(scene, object);
+                    let mesh = voxel_mesh::exposed_faces(voxels, &clear);
+                    let why = format!("{} exposed faces", mesh.triangles.len() / 2);
+                    (mesh, 0.0, why)
+                }
+                Shape::FreeForm(form) => {
+                    let resolution = detail.max_resolution.min(field_mesh::FINEST);
+                    let (mesh, bound) = field_mesh::of_form(form, tolerance, resolution, threads);
+                    let why = format!("{} triangles by dual contouring", mesh.triangles.len());
+                    (mesh, bound, why)
+                }
+                Shape::HeightField(field) => {
+                    let (mesh, bound) = height_mesh::triangulate(field, tolerance);
+                    let why = format!("{} triangles", mesh.triangles.len());
+                    (mesh, bound, why)
+                }
+                Shape::Volume(volume) => {
+                    let (mesh, bound) = field_mesh::of_volume(volume);
+                    let why = format!(
+                        "surface at value {:.4} as {} triangles; what is translucent is lost",
+                        volume.transfer.surface_value(),
+                        mesh.triangles.len()
+                    );
+                    (mesh, bound, why)
+                }
+            };
+            Ok(MeshModel { mesh, bound: bound * scale, why })
+        })
+    }
+
+    /// Returns the shape of an object as voxels: solid bodies filled, meshes and height fields as their surface.
+    ///
+    /// # Errors
+    /// When the shape has no surface at all.
+    pub fn voxels(
+        &self,
+        scene: &Scene,
+        object: &Object,
+        detail: Detail,
+    ) -> Result<Arc<VoxelModel>, ConvertError> {
+        let scale = scale_of(object);
+        self.voxels.get(scene, object, detail, |detail| {
+            let mut model =
+                voxelize::voxelize(scene, object, detail.tolerance / scale, detail.max_resolution)
+                    .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
+            model.bound *= scale;
+            Ok(model)
+        })
+    }
+
+    /// Returns the shape of an object as signed distances. Shapes that are not meshes go through triangles; the
+    /// bounds add up.
+    ///
+    /// # Errors
+    /// When the shape has no surface at all.
+    pub fn distance(
+        &self,
+        scene: &Scene,
+        object: &Object,
+        detail: Detail,
+        threads: &dyn Threads,
+    ) -> Result<Arc<DistanceModel>, ConvertError> {
+        let scale = scale_of(object);
+        let half = Detail { tolerance: detail.tolerance * 0.5, ..detail };
+        let surface = self.mesh(scene, object, half, threads)?;
+        self.distances.get(scene, object, detail, |detail| {
+            let tolerance = detail.tolerance / scale;
+            let mut model =
+                distance::of_mesh(scene, object, &surface.mesh, tolerance, detail.max_resolution, threads)
+                    .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
+            model.bound = model.bound * scale + surface.bound;
+            Ok(model)
+        })
+    }
+
+    /// Tells what [`Converter::mesh`] would make.
+    #[must_use]
+    pub fn mesh_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
+        if let Some(model) = self.meshes.find(scene, object, detail) {
+            return Forecast { bytes: model.mesh.bytes(), bound: model.bound, builds: model.why.clone() };
+        }
+        let scale = scale_of(object);
+        let tolerance = class_tolerance(detail.tolerance) / scale;
+        let (triangles, bound) = match &*object.shape {
+            Shape::Mesh(mesh) => (mesh.triangles.len() as f64, 0.0),
+            Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
+            Shape::Voxels(voxels) => {
+                (voxel_mesh::count_faces(voxels, &clear_values(scene, object)) as f64 * 2.0, 0.0)
+            }
+            Shape::FreeForm(form) => {
+                field_mesh::forecast(form, tolerance, detail.max_resolution.min(field_mesh::FINEST))
+            }
+            Shape::HeightField(field) => height_mesh::forecast(field, tolerance),
+            Shape::Volume(volume) => {
+                (field_mesh::count_surface_cells(volume) as f64 * 2.0, volume.spacing().length())
+            }
+        };
+        // About one vertex with position, normal and texture coordinates for two triangles.
+        let bytes = (triangles * (12.0 + 0.55 * 32.0)) as u64;
+        Forecast { bytes, bound: bound * scale, builds: format!("about {triangles:.0} triangles") }
+    }
+
+    /// Tells what [`Converter::voxels`] would make.
+    #[must_use]
+    pub fn voxels_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
+        if let Some(model) = self.voxels.find(scene, object, detail) {
+            return Forecast { bytes: model.voxels.bytes(), bound: model.bound, builds: model.why.clone() };
+        }
+        let scale = scale_of(object);
+        let tolerance = class_tolerance(detail.tolerance) / scale;
+        let (size, cell) = voxelize::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
+        let chunks = size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>();
+        let bytes = chunks * u64::from(crate::scene::CHUNK).pow(3);
+        let [x, y, z] = size;
+        Forecast { bytes, bound: cell * 3f64.sqrt() * scale, builds: format!("{x}x{y}x{z} voxels") }
+    }
+
+    /// Tells what [`Converter::distance`] would make.
+    #[must_use]
+    pub fn distance_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
+        if let Some(model) = self.distances.find(scene, object, detail) {
+            let bytes = model.distances.len() as u64 * 5;
+            return Forecast { bytes, bound: model.bound, builds: model.why.clone() };
+        }
+        let scale = scale_of(object);
+        let tolerance = class_tolerance(detail.tolerance) / scale;
+        let (size, step) = distance::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
+        let bytes = size.iter().map(|&s| u64::from(s)).product::<u64>() * 5;
+        let [x, y, z] = size;
+        Forecast {
+            bytes,
+            bound: distance::bound(step) * scale,
+            builds: format!("{x}x{y}x{z} signed distances"),
+        }
+    }
+}
+
+/// Returns the largest factor by which the object's transform stretches a length.
+fn scale_of(object: &Object) -> f64 {
+    let m = object.world_from_object.matrix3;
+    // The Frobenius norm bounds the spectral norm; for rotations with uniform scale it is sqrt(3) of it, so
+    // the exact largest singular value is found by a few power iterations instead.
+    let square = m.transpose() * m;
+    let mut v = DVec3::new(0.6, 0.5, 0.4);
+    for _ in 0..64 {
+        v = (square * v).normalize_or(DVec3::X);
+    }
+    let scale = (square * v).length().sqrt();
+    if scale > 0.0 && scale.is_finite() { scale } else { 1.0 }
+}
+
+/// Tells for each palette byte whether light passes through.
+fn clear_values(scene: &Scene, object: &Object) -> [bool; 256] {
+    std::array::from_fn(|v| v == 0 || scene.material(object, v - 1).is_see_through())
+}
+
+/// Rounds a tolerance down to its class: powers of the square root of two.
+fn class_of(tolerance: f64) -> i32 {
+    if tolerance > 0.0 && tolerance.is_finite() {
+        (tolerance.log2() * 2.0 + 1e-9).floor() as i32
+    } else {
+        i32::MIN
+    }
+}
+
+fn class_tolerance(tolerance: f64) -> f64 {
+    match class_of(tolerance) {
+        i32::MIN => 0.0,
+        class => 2f64.powf(f64::from(class) * 0.5),
+    }
+}
+
+/// Results by shape, class and the materials that went into them.
+struct Cache<T> {
+    entries: Mutex<HashMap<(usize, i32, u32), Vec<Entry<T>>>>,
+}
+
+struct Entry<T> {
+    /// Keeps the address of the shape from being used again while the entry stands.
+    shape: Weak<Shape>,
+    scale: DAffine3,
+    materials: Vec<Material>,
+    model: Arc<T>,
+}
+
+impl<T> Default for Cache<T> {
+    fn default() -> Self {
+        Self { entries: Mutex::new(HashMap::new()) }
+    }
+}
+
+impl<T> Cache<T> {
+    fn key(object: &Object, detail: Detail) -> (usize, i32, u32) {
+        (Arc::as_ptr(&object.shape) as usize, class_of(detail.tolerance), detail.max_resolution)
+    }
+
+    fn find(&self, scene: &Scene, object: &Object, detail: Detail) -> Option<Arc<T>> {
+        let entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
+        entries
+            .get(&Self::key(object, detail))?
+            .iter()
+            .find(|e| e.fits(scene, object))
+            .map(|e| e.model.clone())
+    }
+
+    /// Finds a result or makes it; results of shapes that are gone are dropped.
+    fn get(
+        &self,
+        scene: &Scene,
+        object: &Object,
+        detail: Detail,
+        make: impl FnOnce(Detail) -> Result<T, ConvertError>,
+    ) -> Result<Arc<T>, ConvertError> {
+        if let Some(model) = self.find(scene, object, detail) {
+            return Ok(model);
+        }
+        if let Some(reason) = object.why_undrawable() {
+            return Err(ConvertError { object: object.name.clone(), reason: reason.to_owned() });
+        }
+        let model = Arc::new(make(Detail { tolerance: class_tolerance(detail.tolerance), ..detail })?);
+        let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
+        entries.retain(|_, list| {
+            list.retain(|e| e.shape.strong_count() > 0);
+            !list.is_empty()
+        });
+        entries.entry(Self::key(object, detail)).or_default().push(Entry {
+            shape: Arc::downgrade(&object.shape),
+            scale: object.world_from_object,
+            materials: object_materials(scene, object),
+            model: model.clone(),
+        });
+        Ok(model)
+    }
+}
+
+impl<T> Entry<T> {
+    fn fits(&self, scene: &Scene, object: &Object) -> bool {
+        self.scale.matrix3 == object.world_from_object.matrix3
+            && self.materials.len() == object.materials.len()
+            && self.materials.iter().enumerate().all(|(slot, m)| m == scene.material(object, slot))
+    }
+}
+
+fn object_materials(scene: &Scene, object: &Object) -> Vec<Material> {
+    (0..object.materials.len()).map(|slot| scene.material(object, slot).clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parallel::OneThread;
+    use crate::scene::Primitive;
+
+    fn ball() -> (Scene, Object) {
+        let object = Object::new("ball", Shape::Primitive(Primitive::Sphere { radius: 1.0 }), 0);
+        (Scene::default(), object)
+    }
+
+    #[test]
+    fn the_same_class_is_converted_once_and_shared() {
+        let (scene, object) = ball();
+        let converter = Converter::default();
+        let get = |object: &Object, tolerance: f64| {
+            converter.mesh(&scene, object, Detail { tolerance, max_resolution: 64 }, &OneThread).unwrap()
+        };
+        assert!(Arc::ptr_eq(&get(&object, 0.0101), &get(&object.clone(), 0.0105)));
+        assert!(!Arc::ptr_eq(&get(&object, 0.01), &get(&object, 0.001)));
+        assert!(get(&object, 0.01).bound <= 0.01);
+    }
+
+    #[test]
+    fn tolerance_is_meant_in_world_space() {
+        let (scene, mut object) = ball();
+        let converter = Converter::default();
+        let detail = Detail { tolerance: 0.01, max_resolution: 64 };
+        let small = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+        object.world_from_object = DAffine3::from_scale(DVec3::splat(100.0));
+        let large = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+        assert!(large.bound <= 0.01, "{}", large.bound);
+        assert!(large.mesh.triangles.len() > 20 * small.mesh.triangles.len());
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_cannot_be_converted() {
+        let (scene, mut object) = ball();
+        object.world_from_object = DAffine3::from_scale(DVec3::new(1.0, 0.0, 1.0));
+        let error = Converter::default()
+            .mesh(&scene, &object, Detail { tolerance: 0.1, max_resolution: 8 }, &OneThread)
+            .unwrap_err();
+        assert_eq!(error.to_string(), "ball: its transform squeezes it to nothing");
+    }
 }
