@@ -13,6 +13,7 @@ pub mod camera;
 pub mod convert;
 pub mod framebuffer;
 pub mod math;
+pub mod metrics;
 pub mod parallel;
 pub mod scene;
 pub mod seam;

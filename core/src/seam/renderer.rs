@@ -35,6 +35,13 @@ pub trait Renderer: Send {
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError>;
 
+    /// Returns the scene as it is drawn, converted shapes in place of the given ones, so that the method can be
+    /// held against the reference on its own model. Nothing where every shape is drawn as given, or where the
+    /// model is no [`crate::scene::Shape`].
+    fn model(&self) -> Option<Arc<Scene>> {
+        None
+    }
+
     /// Draws what was prepared into the target's channels. The camera may differ from the one that was needed.
     ///
     /// # Errors
