@@ -17,6 +17,8 @@ pub struct BackendInfo {
     pub native: Vec<ShapeKind>,
     /// Channels that it can deliver.
     pub channels: Channels,
+    /// Whether its colors are meant to be those of the lighting equation; a stylized picture is not.
+    pub photometric: bool,
     /// Its parameters.
     pub parameters: Vec<Parameter>,
 }
