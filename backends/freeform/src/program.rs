@@ -1,0 +1,321 @@
+//! A free form as a list of steps for a stack machine, and which of them matter in a part of space.
+
+use glam::DVec3;
+use polyptych_core::math::{Aabb, Interval};
+use polyptych_core::scene::{Form, Power, Quadric};
+
+/// One step. Functions are pushed on a stack; combinations take theirs from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Step {
+    /// Pushes a quadric by its index.
+    Leaf(u32),
+    /// Takes `q`, then adds `weight * R(q)` to what lies below.
+    Term { weight: f64, power: Power },
+    /// Takes two, pushes the larger.
+    Max,
+    /// Takes two, pushes the smaller.
+    Min,
+    /// Changes the sign.
+    Neg,
+    /// Adds a constant.
+    Add(f64),
+    /// Takes two, pushes their smooth union.
+    Smooth(f64),
+    /// Takes `from` and `to`, pushes their mix.
+    Mix(f64),
+    /// Takes `s` and `flat`, pushes `ring * flat - s^2`.
+    Torus(f64),
+}
+
+/// A form as steps in postfix order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Program {
+    pub(crate) steps: Vec<Step>,
+    pub(crate) leaves: Vec<Quadric>,
+    /// Most values on the stack at once.
+    pub(crate) depth: usize,
+}
+
+impl Program {
+    pub(crate) fn new(form: &Form) -> Self {
+        let mut program = Self::default();
+        program.push(form);
+        let mut height = 0usize;
+        for step in &program.steps {
+            height = match step {
+                Step::Leaf(_) => height + 1,
+                Step::Neg | Step::Add(_) => height,
+                _ => height - 1,
+            };
+            program.depth = program.depth.max(height);
+        }
+        program
+    }
+
+    fn leaf(&mut self, quadric: Quadric) {
+        self.steps.push(Step::Leaf(self.leaves.len() as u32));
+        self.leaves.push(quadric);
+    }
+
+    fn push(&mut self, form: &Form) {
+        if let Some(quadric) = form.as_quadric() {
+            self.leaf(quadric);
+            return;
+        }
+        match form {
+            Form::Torus { major, minor } => {
+                let (r2, m2) = (major * major, minor * minor);
+                self.leaf(Quadric([1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+                self.leaf(Quadric([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r2 - m2]));
+                self.steps.push(Step::Torus(4.0 * r2));
+            }
+            Form::Perturbed { base, terms } => {
+                self.push(base);
+                for term in terms {
+                    self.push(&term.function);
+                    self.steps.push(Step::Term { weight: term.weight, power: term.power });
+                }
+            }
+            Form::Union(parts) => self.combine(parts, Step::Max, f64::NEG_INFINITY),
+            Form::Intersection(parts) => self.combine(parts, Step::Min, f64::INFINITY),
+            Form::Difference(a, b) => {
+                self.push(a);
+                self.push(b);
+                self.steps.extend([Step::Neg, Step::Min]);
+            }
+            Form::SmoothUnion { a, b, k } => {
+                self.push(a);
+                self.push(b);
+                self.steps.push(Step::Smooth(*k));
+            }
+            Form::Offset { form, amount } => {
+                self.push(form);
+                self.steps.push(Step::Add(*amount));
+            }
+            Form::Morph { from, to, t } => {
+                self.push(from);
+                self.push(to);
+                self.steps.push(Step::Mix(*t));
+            }
+            _ => {}
+        }
+    }
+
+    fn combine(&mut self, parts: &[Form], step: Step, empty: f64) {
+        if parts.is_empty() {
+            // Nothing combined: everywhere or nowhere.
+            let sign = empty.signum();
+            self.leaf(Quadric([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, sign]));
+        }
+        for (i, part) in parts.iter().enumerate() {
+            self.push(part);
+            if i > 0 {
+                self.steps.push(step);
+            }
+        }
+    }
+}
+
+/// The steps that matter in a part of space, with the reason that the others do not: perturbations that are
+/// zero there, and sides of a union or intersection that lose everywhere.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Active {
+    pub(crate) steps: Vec<Step>,
+    /// Where each value on the stack began in `steps`, with its bounds.
+    stack: Vec<(usize, Interval)>,
+}
+
+impl Active {
+    /// Keeps what matters in a box and returns the bounds of the form there. Allocates only when a program is
+    /// longer than any before.
+    pub(crate) fn prune(&mut self, program: &Program, from: &[Step], part: &Aabb) -> Interval {
+        self.steps.clear();
+        self.stack.clear();
+        for &step in from {
+            match step {
+                Step::Leaf(leaf) => {
+                    self.stack.push((self.steps.len(), program.leaves[leaf as usize].interval(part)));
+                    self.steps.push(step);
+                }
+                Step::Term { weight, power } => self.term(weight, power),
+                Step::Max => self.select(step, |a, b| a.lo >= b.hi, Interval::max),
+                Step::Min => self.select(step, |a, b| a.hi <= b.lo, Interval::min),
+                Step::Neg => self.unary(step, |a| -a),
+                Step::Add(amount) => self.unary(step, |a| a + Interval::point(amount)),
+                Step::Smooth(k) => self.select(step, |a, b| a.lo - b.hi >= k, |a, b| smooth(a, b, k)),
+                Step::Mix(t) => self.select(step, |_, _| false, |a, b| a * (1.0 - t) + b * t),
+                Step::Torus(ring) => self.select(step, |_, _| false, |flat, s| flat * ring - s.square()),
+            }
+        }
+        self.stack.first().map_or(Interval::point(-1.0), |top| top.1)
+    }
+
+    fn term(&mut self, weight: f64, power: Power) {
+        let Some((begin, q)) = self.stack.pop() else { return };
+        if q.hi <= 0.0 {
+            self.steps.truncate(begin);
+            return;
+        }
+        let q = q.positive_part();
+        let raised = match power {
+            Power::Square => q.square(),
+            Power::Cube => q.square() * q,
+        };
+        if let Some(base) = self.stack.last_mut() {
+            base.1 = base.1 + raised * weight;
+        }
+        self.steps.push(Step::Term { weight, power });
+    }
+
+    fn unary(&mut self, step: Step, apply: impl Fn(Interval) -> Interval) {
+        if let Some(top) = self.stack.last_mut() {
+            top.1 = apply(top.1);
+        }
+        self.steps.push(step);
+    }
+
+    /// Drops a side that loses everywhere: `wins(a, b)` tells that `a` alone decides.
+    fn select(
+        &mut self,
+        step: Step,
+        wins: impl Fn(Interval, Interval) -> bool,
+        both: impl Fn(Interval, Interval) -> Interval,
+    ) {
+        let (Some((b_begin, b)), Some((a_begin, a))) = (self.stack.pop(), self.stack.pop()) else { return };
+        if wins(a, b) {
+            self.steps.truncate(b_begin);
+            self.stack.push((a_begin, a));
+        } else if wins(b, a) {
+            self.steps.drain(a_begin..b_begin);
+            self.stack.push((a_begin, b));
+        } else {
+            self.steps.push(step);
+            self.stack.push((a_begin, both(a, b)));
+        }
+    }
+}
+
+fn smooth(a: Interval, b: Interval, k: f64) -> Interval {
+    let gap = a - b;
+    let nearest = if gap.contains(0.0) { 0.0 } else { gap.lo.abs().min(gap.hi.abs()) };
+    let farthest = gap.lo.abs().max(gap.hi.abs());
+    let fillet = |gap: f64| (k - gap).max(0.0).powi(2) / (4.0 * k);
+    a.max(b) + Interval::new(fillet(farthest), fillet(nearest))
+}
+
+/// Evaluates steps and their gradient at a point, in double precision.
+pub(crate) fn value_and_gradient(
+    program: &Program,
+    steps: &[Step],
+    p: DVec3,
+    stack: &mut Vec<(f64, DVec3)>,
+) -> (f64, DVec3) {
+    stack.clear();
+    for &step in steps {
+        if let Step::Leaf(leaf) = step {
+            let q = &program.leaves[leaf as usize];
+            stack.push((q.value(p), q.gradient(p)));
+            continue;
+        }
+        let Some((b, db)) = stack.pop() else { break };
+        if let Step::Neg | Step::Add(_) = step {
+            stack.push(if let Step::Add(amount) = step { (b + amount, db) } else { (-b, -db) });
+            continue;
+        }
+        let Some((a, da)) = stack.pop() else { break };
+        stack.push(match step {
+            Step::Term { weight, power } => {
+                let (r, slope) = power.apply(b);
+                (a + weight * r, da + db * (weight * slope))
+            }
+            Step::Max => {
+                if a >= b {
+                    (a, da)
+                } else {
+                    (b, db)
+                }
+            }
+            Step::Min => {
+                if a <= b {
+                    (a, da)
+                } else {
+                    (b, db)
+                }
+            }
+            Step::Smooth(k) => {
+                let (top, dtop, low, dlow) = if a >= b { (a, da, b, db) } else { (b, db, a, da) };
+                let overlap = (k - (top - low)).max(0.0);
+                let share = overlap / (2.0 * k);
+                (top + overlap * overlap / (4.0 * k), dtop * (1.0 - share) + dlow * share)
+            }
+            Step::Mix(t) => (a * (1.0 - t) + b * t, da * (1.0 - t) + db * t),
+            Step::Torus(ring) => (ring * a - b * b, da * ring - db * (2.0 * b)),
+            Step::Leaf(_) | Step::Neg | Step::Add(_) => (a, da),
+        });
+    }
+    stack.first().copied().unwrap_or((-1.0, DVec3::ZERO))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use polyptych_core::scene::Perturbation;
+
+    /// A figure that uses every step.
+    pub(crate) fn everything() -> Form {
+        let ball =
+            |x: f64, r: f64| Form::Ellipsoid { center: DVec3::new(x, 0.1, -0.2), radii: DVec3::splat(r) };
+        let bump = Perturbation { weight: 0.7, power: Power::Cube, function: ball(0.8, 0.5) };
+        let dent = Perturbation {
+            weight: -0.4,
+            power: Power::Square,
+            function: Form::Perturbed { base: Box::new(ball(-0.6, 0.4)), terms: vec![bump.clone()] },
+        };
+        Form::Union(vec![
+            Form::SmoothUnion {
+                a: Box::new(Form::Perturbed { base: Box::new(ball(0.0, 1.0)), terms: vec![bump, dent] }),
+                b: Box::new(Form::Torus { major: 1.0, minor: 0.2 }),
+                k: 0.3,
+            },
+            Form::Difference(
+                Box::new(Form::Intersection(vec![
+                    Form::Cylinder { center: DVec3::ZERO, axis: DVec3::new(1.0, 1.0, 0.3), radius: 0.4 },
+                    ball(0.0, 1.5),
+                ])),
+                Box::new(Form::HalfSpace { normal: DVec3::Y, offset: 0.1 }),
+            ),
+            Form::Morph {
+                from: Box::new(ball(1.0, 0.2)),
+                to: Box::new(Form::Offset { form: Box::new(ball(1.2, 0.3)), amount: 0.05 }),
+                t: 0.4,
+            },
+        ])
+    }
+
+    #[test]
+    fn a_pruned_program_has_the_same_values_in_its_box() {
+        let form = everything();
+        let program = Program::new(&form);
+        let mut active = Active::default();
+        let mut stack = Vec::new();
+        let mut shorter = 0;
+        for i in 0..400 {
+            let place = |k: i32| f64::from((i * k) % 97) / 48.5 - 1.0;
+            let middle = DVec3::new(place(17), place(29), place(41)) * 1.5;
+            let part = Aabb::new(middle - 0.1, middle + 0.1);
+            let bounds = active.prune(&program, &program.steps, &part);
+            shorter += usize::from(active.steps.len() < program.steps.len());
+            for corner in part.corners() {
+                let (value, gradient) = value_and_gradient(&program, &active.steps, corner, &mut stack);
+                let (exact, slope) = form.value_and_gradient(corner);
+                assert!(
+                    (value - exact).abs() <= 1e-12 * (1.0 + exact.abs()),
+                    "{value} for {exact} at {corner}"
+                );
+                assert!((gradient - slope).length() <= 1e-9 * (1.0 + slope.length()) || value == 0.0);
+                assert!(bounds.contains(value));
+            }
+        }
+        assert!(shorter > 300, "pruning does something: {shorter} of 400");
+    }
+}
