@@ -7,6 +7,7 @@
 
 mod error;
 mod folder;
+mod gltf;
 pub mod image;
 mod limits;
 mod mtl;
@@ -95,6 +96,7 @@ fn extension_of(path: &Path) -> String {
 fn reader_of(extension: &str, _options: &LoadOptions) -> Result<Reader, Fault> {
     Ok(match extension {
         "obj" => obj_scene::load,
+        "gltf" | "glb" => gltf::load,
         other => return Err(unknown(other)),
     })
 }

@@ -90,6 +90,7 @@ pub(crate) fn read(bytes: &[u8], limits: &Limits, notes: &mut Notes) -> Result<O
     if statements.points > 0 {
         notes.add("points (`p`) are not drawn");
     }
+    statements.forget_absent_attributes(notes);
     statements.check_indices()?;
     let libraries = std::mem::take(&mut statements.libraries);
     Ok(Obj { parts: obj_parts::build(statements, notes), libraries })
@@ -366,6 +367,19 @@ impl Statements {
     pub(super) fn corners_of(&self, face: usize) -> std::ops::Range<usize> {
         let end = self.faces.get(face + 1).map_or(self.corners.len(), |next| next.first as usize);
         self.faces[face].first as usize..end
+    }
+
+    /// Drops indices to texture vertices or normals where the file has none at all, as some exporters write them.
+    fn forget_absent_attributes(&mut self, notes: &mut Notes) {
+        for (what, list, count) in [
+            ("texture vertices", &mut self.corner_uvs, self.uvs.len()),
+            ("normals", &mut self.corner_normals, self.normals.len()),
+        ] {
+            if count == 0 && !list.is_empty() {
+                list.clear();
+                notes.add(format!("faces refer to {what}, but there are none"));
+            }
+        }
     }
 
     fn check_indices(&mut self) -> Result<(), Fault> {

@@ -41,6 +41,18 @@ pub(super) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
     Ok(scene)
 }
 
+/// Splits the argument of `mtllib`: one name with spaces if there is such a file, else several; `\\ ` is a space.
+fn library_files(argument: &str, source: &Source<'_>) -> Vec<String> {
+    let unescaped = argument.replace("\\ ", " ");
+    for whole in [argument, &unescaped] {
+        if source.folder.find(whole).is_ok() {
+            return vec![whole.to_owned()];
+        }
+    }
+    let joined = argument.replace("\\ ", "\0");
+    joined.split_whitespace().take(64).map(|file| file.replace('\0', " ")).collect()
+}
+
 /// The materials of all libraries, put into the scene when they are first used.
 #[derive(Default)]
 struct MaterialTable {
@@ -50,13 +62,10 @@ struct MaterialTable {
 }
 
 impl MaterialTable {
-    /// Reads a library; the argument of `mtllib` is one name with spaces or several without.
+    /// Reads the libraries that one `mtllib` statement names.
     fn add_library(&mut self, argument: &str, source: &mut Source<'_>) {
-        let whole = source.folder.find(argument);
-        let files: Vec<&str> =
-            if whole.is_ok() { vec![argument] } else { argument.split_whitespace().take(64).collect() };
-        for file in files {
-            let read = source.folder.read(file).and_then(|bytes| mtl::read(&bytes, &mut source.notes));
+        for file in library_files(argument, source) {
+            let read = source.folder.read(&file).and_then(|bytes| mtl::read(&bytes, &mut source.notes));
             match read {
                 Ok(list) => {
                     for entry in list {

@@ -79,7 +79,7 @@ impl RawMesh {
         if self.normals.is_empty() {
             smooth::generate_normals(self);
             notes.add(format!(
-                "{name}: normals generated, creases sharper than {} degrees kept",
+                "normals generated, creases sharper than {} degrees kept",
                 smooth::CREASE_DEGREES
             ));
         } else {
@@ -92,10 +92,33 @@ impl RawMesh {
         }
     }
 
+    /// Drops vertices that no triangle and no segment uses.
+    pub(crate) fn keep_used_vertices(&mut self) {
+        let mut place = vec![u32::MAX; self.positions.len()];
+        let mut order = Vec::new();
+        for i in self.triangles.iter_mut().flatten().chain(self.segments.iter_mut().flatten()) {
+            let to = &mut place[*i as usize];
+            if *to == u32::MAX {
+                *to = order.len() as u32;
+                order.push(*i as usize);
+            }
+            *i = *to;
+        }
+        fn pick<T: Copy>(list: &mut Vec<T>, order: &[usize]) {
+            if !list.is_empty() {
+                *list = order.iter().map(|&i| list[i]).collect();
+            }
+        }
+        pick(&mut self.positions, &order);
+        pick(&mut self.normals, &order);
+        pick(&mut self.uvs, &order);
+        pick(&mut self.colors, &order);
+    }
+
     /// Adds another mesh; attributes that only one of the two has are filled up.
     pub(crate) fn append(&mut self, other: Self) {
         let (first, second) = (self.positions.len(), other.positions.len());
-        join(&mut self.normals, other.normals, [first, second], Vec3::ZERO);
+        join(&mut self.normals, other.normals, [first, second], Vec3::Y);
         join(&mut self.uvs, other.uvs, [first, second], Vec2::ZERO);
         join(&mut self.colors, other.colors, [first, second], Vec3::ONE);
         join(&mut self.slots, other.slots, [self.triangles.len(), other.triangles.len()], 0);
