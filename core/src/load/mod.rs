@@ -20,6 +20,7 @@ mod smooth;
 mod source;
 mod surface;
 mod text;
+mod vox;
 
 pub use error::LoadError;
 pub use limits::{Limits, LoadOptions, RawVolume, SampleFormat};
@@ -97,6 +98,7 @@ fn reader_of(extension: &str, _options: &LoadOptions) -> Result<Reader, Fault> {
     Ok(match extension {
         "obj" => obj_scene::load,
         "gltf" | "glb" => gltf::load,
+        "vox" => vox::load,
         other => return Err(unknown(other)),
     })
 }

@@ -1,6 +1,6 @@
 //! Takes a glTF file apart: the JSON text and the binary chunk of a `.glb`, checked before anything is parsed.
 
-use super::document::Document;
+use super::document::{Asset, Document, Head};
 use crate::load::error::{Fault, one_line};
 
 /// Deepest nesting of the JSON text. The deepest of real files is 12; parsers recurse.
@@ -70,6 +70,12 @@ pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
 pub(super) fn parse(json: &[u8]) -> Result<Document, Fault> {
     check_depth(json)?;
     let document: Document = serde_json::from_slice(json).map_err(|error| {
+        // A document of another version has other types: say that instead.
+        if let Ok(Head { asset: Some(asset) }) = serde_json::from_slice(json)
+            && let Err(fault) = check_version(&asset)
+        {
+            return fault;
+        }
         let text = error.to_string();
         let cause = text.split(" at line ").next().unwrap_or(&text);
         Fault::malformed(format!("line {} column {} of the JSON: {cause}", error.line(), error.column()))
@@ -77,12 +83,7 @@ pub(super) fn parse(json: &[u8]) -> Result<Document, Fault> {
     let Some(asset) = &document.asset else {
         return Err(Fault::malformed("field `asset` is missing"));
     };
-    let wanted = asset.min_version.as_ref().unwrap_or(&asset.version);
-    let readable = if asset.min_version.is_some() { wanted == "2.0" } else { wanted.starts_with("2.") };
-    if !readable {
-        let what = format!("field `asset`: glTF version {}, only 2.0 is read", one_line(wanted));
-        return Err(Fault::unsupported(what, "export it as glTF 2.0"));
-    }
+    check_version(asset)?;
     for extension in &document.extensions_required {
         if extension == "KHR_draco_mesh_compression" || extension == "EXT_meshopt_compression" {
             let what = format!(
@@ -96,6 +97,16 @@ pub(super) fn parse(json: &[u8]) -> Result<Document, Fault> {
         }
     }
     Ok(document)
+}
+
+fn check_version(asset: &Asset) -> Result<(), Fault> {
+    let wanted = asset.min_version.as_ref().unwrap_or(&asset.version);
+    let readable = if asset.min_version.is_some() { wanted == "2.0" } else { wanted.starts_with("2.") };
+    if readable {
+        return Ok(());
+    }
+    let what = format!("field `asset`: glTF version {}, only 2.0 is read", one_line(wanted));
+    Err(Fault::unsupported(what, "export it as glTF 2.0"))
 }
 
 /// Measures the nesting byte by byte, since the parser would recurse.

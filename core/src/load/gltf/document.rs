@@ -26,6 +26,12 @@ pub(super) struct Document {
     pub(super) extensions: RootExtensions,
 }
 
+/// The version alone, to tell documents of another version from damaged ones.
+#[derive(Deserialize)]
+pub(super) struct Head {
+    pub(super) asset: Option<Asset>,
+}
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Asset {
