@@ -8,6 +8,7 @@
 mod error;
 mod folder;
 mod gltf;
+mod height;
 pub mod image;
 mod limits;
 mod mtl;
@@ -15,18 +16,21 @@ mod notes;
 mod obj;
 mod obj_parts;
 mod obj_scene;
+mod ply;
 mod polygon;
 mod smooth;
 mod source;
+mod stl;
 mod surface;
 mod text;
+mod volume;
 mod vox;
 
 pub use error::LoadError;
 pub use limits::{Limits, LoadOptions, RawVolume, SampleFormat};
 
 use crate::camera::{Camera, Projection};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, Material, Object, Scene, Shape};
 use error::{Fault, one_line};
 use folder::Folder;
 use glam::DVec3;
@@ -86,6 +90,20 @@ pub fn add_default_view(scene: &mut Scene) {
     }
 }
 
+/// Makes a scene of one mesh.
+fn scene_of_mesh(mesh: surface::RawMesh, source: &mut Source<'_>) -> Scene {
+    let mut scene = Scene::default();
+    if mesh.triangles.is_empty() && mesh.segments.is_empty() {
+        source.notes.add("the file has no faces");
+        return scene;
+    }
+    let (mesh, world_from_object) = mesh.finish(&source.name, &mut source.notes);
+    let material = scene.add_material(Material::default());
+    let object = Object::new(source.name.clone(), Shape::Mesh(mesh), material);
+    scene.objects.push(object.placed(world_from_object));
+    scene
+}
+
 type Reader = fn(&mut Source<'_>) -> Result<Scene, Fault>;
 
 fn extension_of(path: &Path) -> String {
@@ -94,11 +112,23 @@ fn extension_of(path: &Path) -> String {
     if extension == "gz" && stem.ends_with(".nii") { "nii.gz".to_owned() } else { extension }
 }
 
-fn reader_of(extension: &str, _options: &LoadOptions) -> Result<Reader, Fault> {
+fn reader_of(extension: &str, options: &LoadOptions) -> Result<Reader, Fault> {
     Ok(match extension {
         "obj" => obj_scene::load,
         "gltf" | "glb" => gltf::load,
+        "stl" => stl::load,
+        "ply" => ply::load,
         "vox" => vox::load,
+        "nrrd" | "nhdr" | "nii" | "nii.gz" | "raw" => volume::load,
+        "png" | "tif" | "tiff" | "jpg" | "jpeg" | "bmp" | "tga" | "gif" | "hdr" | "exr"
+            if options.height_map =>
+        {
+            height::load
+        }
+        "png" | "tif" | "tiff" | "jpg" | "jpeg" | "bmp" | "tga" | "gif" | "hdr" | "exr" => {
+            let what = "a picture is no scene by itself";
+            return Err(Fault::unsupported(what, "ask for it as a height map (`--height-map`)"));
+        }
         other => return Err(unknown(other)),
     })
 }

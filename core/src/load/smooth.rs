@@ -70,7 +70,7 @@ fn face_normal(mesh: &RawMesh, t: &[u32; 3]) -> Vec3 {
 /// Gives the same number to all vertices at exactly the same position, counted up in their order.
 ///
 /// The table holds only vertex numbers, a fifth of what a map from positions would take on large scans.
-fn weld(positions: &[DVec3]) -> Vec<u32> {
+pub(crate) fn weld(positions: &[DVec3]) -> Vec<u32> {
     // + 0 turns -0 into 0
     let key = |p: &DVec3| p.to_array().map(|c| (c + 0.0).to_bits());
     let hasher = RandomState::new();

@@ -115,6 +115,19 @@ impl RawMesh {
         pick(&mut self.colors, &order);
     }
 
+    /// Makes one vertex of all at the same position; only for meshes without attributes.
+    pub(crate) fn weld(&mut self) {
+        let points = smooth::weld(&self.positions);
+        let mut welded = Vec::new();
+        for (position, &point) in self.positions.iter().zip(&points) {
+            if point as usize == welded.len() {
+                welded.push(*position);
+            }
+        }
+        self.triangles.iter_mut().flatten().for_each(|i| *i = points[*i as usize]);
+        self.positions = welded;
+    }
+
     /// Adds another mesh; attributes that only one of the two has are filled up.
     pub(crate) fn append(&mut self, other: Self) {
         let (first, second) = (self.positions.len(), other.positions.len());

@@ -52,9 +52,21 @@ impl<'a> Words<'a> {
         self.line
     }
 
-    /// Returns where the cursor is.
-    pub(crate) fn position(&self) -> usize {
-        self.at
+    /// Returns the number of bytes that are left.
+    pub(crate) fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    /// Returns the next word of this line or a later one; nothing at the end of the text.
+    pub(crate) fn next_word(&mut self) -> Option<&'a [u8]> {
+        loop {
+            if let Some(word) = self.word() {
+                return Some(word);
+            }
+            if !self.next_line() {
+                return None;
+            }
+        }
     }
 
     /// Returns the next word of the line; nothing at its end or at a comment.

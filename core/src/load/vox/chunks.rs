@@ -69,11 +69,10 @@ pub(super) fn read<'a>(bytes: &'a [u8], notes: &mut Notes) -> Result<Chunks<'a>,
     if !(150..=200).contains(&version) {
         notes.add(format!("the file has version {version}, it is read like 200"));
     }
-    let (kind, mut content, children) = file.chunk()?;
+    let (kind, _, children) = file.chunk()?;
     if kind != b"MAIN" {
         return Err(Fault::malformed(format!("byte 8: the first chunk is {}, not MAIN", shown(kind))));
     }
-    content.at = content.end;
     let mut chunks = Chunks::default();
     let (mut rest, mut size) = (children, None);
     while rest.at < rest.end {
