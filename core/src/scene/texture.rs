@@ -2,9 +2,12 @@
 
 use crate::shade::linear_from_srgb;
 use glam::{Vec2, Vec3, Vec4};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// What a lookup outside of `[0, 1]` means.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum TextureWrap {
     /// The picture repeats.
     #[default]

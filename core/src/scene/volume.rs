@@ -99,6 +99,28 @@ pub struct TransferPoint {
 }
 
 impl TransferFunction {
+    /// Returns a transfer function for computed tomography in Hounsfield units: air is empty, skin and muscle thin
+    /// and warm, bone white and dense. The steps follow the scale: air -1000, fat -100, water 0, muscle 50, bone from 300.
+    #[must_use]
+    pub fn ct(reference_length: f64) -> Self {
+        let point = |value: f32, color: [f32; 3], opacity: f32| TransferPoint {
+            value,
+            color: Vec3::from_array(color),
+            opacity,
+        };
+        Self {
+            points: vec![
+                point(-500.0, [0.80, 0.45, 0.32], 0.0),
+                point(-250.0, [0.82, 0.50, 0.36], 0.02),
+                point(60.0, [0.78, 0.30, 0.22], 0.04),
+                point(180.0, [0.90, 0.70, 0.52], 0.10),
+                point(320.0, [0.95, 0.91, 0.82], 0.55),
+                point(1200.0, [1.0, 0.98, 0.94], 0.95),
+            ],
+            reference_length,
+        }
+    }
+
     /// Returns color and opacity for a value; values that are not a number are empty.
     #[must_use]
     pub fn at(&self, value: f32) -> (Vec3, f32) {
