@@ -1,0 +1,244 @@
+//! What the command line looks like.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use polyptych::framebuffer::Channel;
+use std::path::PathBuf;
+
+/// Renders one scene through several back ends, side by side, and tells how fast and how right each one is.
+#[derive(Parser, Debug)]
+#[command(name = "polyptych", version, about, disable_help_subcommand = true)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    pub(super) command: Option<Command>,
+}
+
+#[derive(Subcommand, Debug)]
+pub(super) enum Command {
+    /// Draw one picture.
+    Render(RenderArguments),
+    /// Draw a scene with every back end beside the reference, with times and errors (the default).
+    Compare(CompareArguments),
+    /// Tell what each back end would build and why; builds nothing.
+    Plan(PlanArguments),
+    /// Time frames.
+    Bench(BenchArguments),
+    /// Convert a scene into a model of triangles, voxels or distances.
+    Convert(ConvertArguments),
+    /// List the back ends with what they draw and their parameters.
+    Backends(BackendsArguments),
+}
+
+#[derive(Args, Debug)]
+pub(super) struct RenderArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    #[command(flatten)]
+    pub(super) draw: DrawArguments,
+    /// File to write: .png, .jpg, .exr or .pfm; `-` draws in the terminal.
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Channel to write.
+    #[arg(long, default_value = "color", value_parser = channel)]
+    pub(super) channel: Channel,
+}
+
+#[derive(Args, Debug, Default)]
+pub(super) struct CompareArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    #[command(flatten)]
+    pub(super) draw: DrawArguments,
+    /// Folder to write to.
+    #[arg(short, long, value_name = "DIR", default_value = "out/compare")]
+    pub(super) output: Option<PathBuf>,
+    /// End with code 4 unless every picture passes its gate.
+    #[arg(long)]
+    pub(super) gate: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct PlanArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    #[command(flatten)]
+    pub(super) draw: DrawArguments,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct BenchArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    #[command(flatten)]
+    pub(super) draw: DrawArguments,
+    /// Frames to time.
+    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(super) frames: u32,
+    /// Frames to draw before.
+    #[arg(long, default_value_t = 2)]
+    pub(super) warmup: u32,
+    /// Move the camera around the scene with every frame.
+    #[arg(long)]
+    pub(super) orbit: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct ConvertArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// File to write: .obj, .glb, .vox or .nrrd.
+    pub(super) output: PathBuf,
+    /// Representation; must fit the file.
+    #[arg(long)]
+    pub(super) to: Option<Representation>,
+    /// Cells along the longest edge.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=2048), conflicts_with = "tolerance")]
+    pub(super) resolution: Option<u32>,
+    /// Greatest distance between the surfaces, meters.
+    #[arg(long)]
+    pub(super) tolerance: Option<f64>,
+    /// Threads; 0 = one for each core.
+    #[arg(long, default_value_t = 0)]
+    pub(super) threads: usize,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct BackendsArguments {
+    /// Print the list as JSON.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Representations that `convert` writes.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Representation {
+    Mesh,
+    Voxels,
+    Volume,
+}
+
+/// Which scene, and what a file without a clear meaning holds.
+#[derive(Args, Debug, Default)]
+pub(super) struct SceneArguments {
+    /// Scene file, model, volume, height map, or builtin:NAME.
+    #[arg(value_name = "SCENE", default_value = "builtin:atelier")]
+    pub(super) scene: Option<String>,
+    /// Size and number format of a .raw volume.
+    #[arg(long, value_name = "WxHxD:u8|u16|i16|f32")]
+    pub(super) volume: Option<String>,
+    /// Read a picture as a height map.
+    #[arg(long)]
+    pub(super) height_map: bool,
+}
+
+/// How to draw: shared by all commands that draw.
+#[derive(Args, Debug, Default)]
+pub(super) struct DrawArguments {
+    /// Back ends, separated by commas.
+    #[arg(short, long, value_name = "ID", value_delimiter = ',')]
+    pub(super) backend: Vec<String>,
+    /// Size of the picture.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(super) size: Option<[u32; 2]>,
+    /// Threads; 0 = one for each core.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub(super) threads: Option<u16>,
+    /// Set a parameter: key=value, or backend.key=value for one of several.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Tolerance and samples together.
+    #[arg(long)]
+    pub(super) quality: Option<Quality>,
+    /// How far an edge may be off, pixels.
+    #[arg(long, value_name = "PX")]
+    pub(super) tolerance: Option<f64>,
+    /// Samples a pixel.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub(super) samples: Option<u32>,
+    #[command(flatten)]
+    pub(super) view: ViewArguments,
+    /// Print the result as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Print no table.
+    #[arg(short, long)]
+    pub(super) quiet: bool,
+    /// Print what was noted while loading, and how each object was drawn.
+    #[arg(short, long)]
+    pub(super) verbose: bool,
+}
+
+/// From where.
+#[derive(Args, Debug, Default)]
+pub(super) struct ViewArguments {
+    /// A camera of the scene.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["view", "eye"])]
+    pub(super) camera: Option<String>,
+    /// Direction from which the whole scene is framed, degrees.
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = numbers::<2>, allow_hyphen_values = true, conflicts_with = "eye")]
+    pub(super) view: Option<[f64; 2]>,
+    /// Position of the eye.
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
+    pub(super) eye: Option<[f64; 3]>,
+    /// Point to look at.
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true, requires = "eye")]
+    pub(super) target: Option<[f64; 3]>,
+    /// What is up in the picture.
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true, requires = "eye")]
+    pub(super) up: Option<[f64; 3]>,
+    /// Field of view, degrees.
+    #[arg(long, value_name = "DEGREES")]
+    pub(super) fov: Option<f64>,
+    /// How directions become pixels.
+    #[arg(long)]
+    pub(super) projection: Option<ProjectionName>,
+}
+
+/// Presets of tolerance and samples.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Quality {
+    /// 2 px, 1 sample.
+    Draft,
+    /// 0.5 px, 1 sample.
+    Normal,
+    /// 0.25 px, 4 samples.
+    High,
+    /// 0.05 px, 16 samples.
+    Exact,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ProjectionName {
+    Perspective,
+    Orthographic,
+    Fisheye,
+    Cylindrical,
+}
+
+fn channel(text: &str) -> Result<Channel, String> {
+    let names: Vec<_> = Channel::ALL.iter().map(|c| c.name()).collect();
+    Channel::ALL
+        .into_iter()
+        .find(|c| c.name() == text)
+        .ok_or_else(|| format!("use one of {}", names.join(", ")))
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let refuse = || "write WIDTHxHEIGHT with numbers from 1 to 16384".to_owned();
+    let (width, height) = text.split_once('x').ok_or_else(refuse)?;
+    let parse = |s: &str| s.parse().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(refuse);
+    Ok([parse(width)?, parse(height)?])
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parsed: Vec<f64> =
+        text.split(',').filter_map(|s| s.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
+    let count = text.split(',').count();
+    parsed
+        .try_into()
+        .ok()
+        .filter(|_| count == N)
+        .ok_or_else(|| format!("write {N} numbers separated by commas"))
+}

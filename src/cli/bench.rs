@@ -1,0 +1,88 @@
+//! `polyptych bench`: how long does a frame take?
+
+use super::arguments::BenchArguments;
+use super::{Failure, input, print};
+use glam::{DMat3, DVec3};
+use polyptych::camera::Camera;
+use polyptych::framebuffer::Framebuffer;
+use polyptych::parallel::Threads;
+use polyptych::seam::{Frame, Need, Report};
+use serde_json::{Value, json};
+
+pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
+    let scene = input::scene(&arguments.scene)?;
+    let mut studio = input::studio(usize::from(arguments.draw.threads.unwrap_or(0)))?;
+    let default = ["raster", "voxel", "freeform", "stylized"];
+    let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
+    let mut settings = input::settings(&arguments.draw, studio.registry(), &backends)?;
+    let base = input::need(&arguments.draw, &scene)?;
+    let threads = studio.pool().count();
+    let mut rows = Vec::new();
+    for backend in &backends {
+        let need = Need { settings: settings.remove(backend).unwrap_or_default(), ..base.clone() };
+        let (prepared, prepare_ms) = studio.prepare(backend, &scene, &need).map_err(Failure::running)?;
+        let mut target = Framebuffer::new(need.width, need.height, need.channels);
+        let mut times = Vec::new();
+        let mut last = Report::default();
+        for i in 0..arguments.warmup + arguments.frames {
+            let angle = if arguments.orbit { f64::from(i) * std::f64::consts::TAU / 90.0 } else { 0.0 };
+            let frame = Frame { camera: turned(&need.camera, scene.bounds().center(), angle) };
+            let (report, time) = studio.render(backend, &frame, &mut target).map_err(Failure::running)?;
+            last = report;
+            if i >= arguments.warmup {
+                times.push(time);
+            }
+        }
+        times.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize];
+        let phases: serde_json::Map<String, Value> = last
+            .phases
+            .iter()
+            .map(|(name, time)| (name.to_owned(), json!(time.as_secs_f64() * 1e3)))
+            .collect();
+        let counters: serde_json::Map<String, Value> =
+            last.counters.iter().flatten().map(|c| (c.name.to_owned(), json!(c.count))).collect();
+        rows.push(json!({
+            "backend": backend, "scene": scene.name, "width": need.width, "height": need.height,
+            "threads": threads, "prepare_ms": prepare_ms, "frames": times.len(),
+            "ms_median": at(0.5), "ms_min": at(0.0), "ms_p95": at(0.95),
+            "bytes": prepared.bytes, "settings": need.settings, "phases": phases, "counters": counters,
+        }));
+    }
+    if arguments.draw.json {
+        print(&format!("{}\n", Value::Array(rows)));
+    } else {
+        print(&table(&rows));
+    }
+    Ok(())
+}
+
+/// Turns a camera around the vertical axis through a point.
+fn turned(camera: &Camera, center: DVec3, angle: f64) -> Camera {
+    let turn = DMat3::from_rotation_y(angle);
+    Camera {
+        eye: center + turn * (camera.eye - center),
+        world_from_camera: turn * camera.world_from_camera,
+        projection: camera.projection.clone(),
+    }
+}
+
+fn table(rows: &[Value]) -> String {
+    let mut text = format!(
+        "{:<12} {:>11} {:>10} {:>10} {:>10} {:>14}\n",
+        "back end", "prepare ms", "median ms", "min ms", "p95 ms", "bytes"
+    );
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap_or(0.0);
+        text.push_str(&format!(
+            "{:<12} {:>11.1} {:>10.2} {:>10.2} {:>10.2} {:>14}\n",
+            row["backend"].as_str().unwrap_or(""),
+            number("prepare_ms"),
+            number("ms_median"),
+            number("ms_min"),
+            number("ms_p95"),
+            row["bytes"]
+        ));
+    }
+    text
+}

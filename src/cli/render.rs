@@ -1,0 +1,57 @@
+//! `polyptych render`: one picture.
+
+use super::arguments::RenderArguments;
+use super::{Failure, input, print};
+use polyptych::framebuffer::Channels;
+use polyptych::picture;
+use polyptych::report::count_decisions;
+use polyptych::seam::Need;
+use serde_json::json;
+
+pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
+    let scene = input::scene(&arguments.scene)?;
+    let mut studio = input::studio(usize::from(arguments.draw.threads.unwrap_or(0)))?;
+    let backends = input::backends(&arguments.draw, studio.registry(), &["raster"])?;
+    let [backend] = &backends[..] else {
+        return Err(Failure::wrong_use("render draws with one back end: use `compare` for several"));
+    };
+    let mut settings = input::settings(&arguments.draw, studio.registry(), &backends)?;
+    let need = Need {
+        channels: Channels::NONE.with(arguments.channel),
+        settings: settings.remove(backend).unwrap_or_default(),
+        ..input::need(&arguments.draw, &scene)?
+    };
+    let drawing = studio.draw(backend, &scene, &need).map_err(Failure::running)?;
+    if arguments.output.as_os_str() == "-" {
+        print(&picture::terminal(&drawing.framebuffer, arguments.channel, 96));
+    } else {
+        picture::save(&drawing.framebuffer, arguments.channel, &arguments.output)
+            .map_err(Failure::running)?;
+    }
+    if arguments.draw.json {
+        let result = json!({
+            "backend": backend, "width": need.width, "height": need.height,
+            "prepare_ms": drawing.prepare_ms, "frame_ms": drawing.frame_ms,
+            "bytes": drawing.prepared.bytes, "objects": count_decisions(&drawing.prepared.objects),
+            "out": arguments.output.to_string_lossy(),
+        });
+        print(&format!("{result}\n"));
+    } else if !arguments.draw.quiet && arguments.output.as_os_str() != "-" {
+        let (prepare, frame) = (drawing.prepare_ms, drawing.frame_ms);
+        print(&format!(
+            "{}: {backend}, {}x{}, prepared in {prepare:.1} ms, drawn in {frame:.1} ms\n",
+            arguments.output.display(),
+            need.width,
+            need.height
+        ));
+    }
+    if arguments.draw.verbose {
+        for note in &scene.notes {
+            eprintln!("note: {note}");
+        }
+        for (object, decision) in scene.objects.iter().zip(drawing.prepared.objects.iter()) {
+            eprintln!("{}: {} {}", object.name, decision.word(), decision.why());
+        }
+    }
+    Ok(())
+}
