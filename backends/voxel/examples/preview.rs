@@ -65,7 +65,7 @@ fn landscape() -> Scene {
         matte(0.16, 0.34, 0.09),
         matte(0.30, 0.24, 0.17),
         matte(0.62, 0.60, 0.56),
-        Material { emission: Vec3::new(260.0, 190.0, 90.0), ..matte(1.0, 0.8, 0.5) },
+        Material { emission: Vec3::new(1300.0, 950.0, 450.0), ..matte(1.0, 0.8, 0.5) },
         Material { opacity: 0.35, ..Material::new(Vec3::new(0.2, 0.55, 0.75)) },
         Material { reflectivity: 0.45, ..Material::new(Vec3::new(0.03, 0.09, 0.14)) },
     ];
@@ -80,9 +80,9 @@ fn landscape() -> Scene {
         let ground = height(x, z);
         let from_tower = (f64::from(x) - 60.0).hypot(f64::from(z) - 60.0);
         match () {
-            () if from_tower < 9.0 && from_tower >= 6.0 && y < 46 && (y < 42 || (x + z) % 4 < 2) => 3,
+            () if (6.0..9.0).contains(&from_tower) && y < 46 && (y < 42 || (x + z) % 4 < 2) => 3,
             () if (x, z) == (100, 84) && y < 32 => 2,
-            () if (99..102).contains(&x) && (83..86).contains(&z) && (32..35).contains(&y) => 4,
+            () if (x, z) == (100, 84) && y == 32 => 4,
             () if (86..118).contains(&x) && z == 116 && y < 40 && y >= ground => 5,
             () if y < ground => {
                 if ground - y < 2 {

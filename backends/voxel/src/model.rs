@@ -116,7 +116,7 @@ fn replace(
     let object = &mut scene.objects[index];
     object.shape = shape.clone();
     object.materials = materials.clone();
-    object.world_from_object = object.world_from_object * model.object_from_voxels;
+    object.world_from_object *= model.object_from_voxels;
 }
 
 /// Returns the grid of an object that is drawn.

@@ -85,7 +85,7 @@ impl Tracer<'_> {
     fn mirrored(&self, ray: &Ray, point: &Point<'_>, color: Vec3, bounces: u32, weight: f64) -> Vec3 {
         let share = point.material.reflectivity.clamp(0.0, 1.0);
         let weight = weight * f64::from(share);
-        if bounces == 0 || !(weight >= OPAQUE) {
+        if bounces == 0 || weight < OPAQUE || weight.is_nan() {
             return color;
         }
         let incoming = ray.direction.dot(point.normal);

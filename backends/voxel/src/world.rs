@@ -102,15 +102,19 @@ pub(crate) struct Point<'a> {
 /// (2e-16), far below any cell.
 const LIFT: f64 = 1e-10;
 
+/// Returns the outward normal of a cell's face in the space of its grid.
+fn outward(face: usize) -> DVec3 {
+    let axis = DVec3::AXES[face / 2];
+    if face.is_multiple_of(2) { -axis } else { axis }
+}
+
 impl Item {
     pub(crate) fn new(scene: &Scene, object: usize, grid: Arc<Grid>, without_holes: bool) -> Self {
         let thing = &scene.objects[object];
         let grid_from_world = thing.world_from_object.inverse();
         let world_from_normal: DMat3 = grid_from_world.matrix3.transpose();
-        let normals = std::array::from_fn(|face| {
-            let outward = DVec3::AXES[face / 2] * if face % 2 == 0 { -1.0 } else { 1.0 };
-            (world_from_normal * outward).normalize_or(outward)
-        });
+        let normals =
+            std::array::from_fn(|face| (world_from_normal * outward(face)).normalize_or(outward(face)));
         Self { object, grid, grid_from_world, normals, radius: thing.bounds().radius(), without_holes }
     }
 
@@ -128,7 +132,7 @@ impl Item {
     /// Tells whether a surface is there at all, and whether it blocks light.
     fn opacity(&self, scene: &Scene, value: u8, walk: &Walk) -> (f32, bool) {
         let material = scene.material(&scene.objects[self.object], usize::from(value) - 1);
-        let normal = DVec3::AXES[walk.face() / 2] * if walk.face() % 2 == 0 { -1.0 } else { 1.0 };
+        let normal = outward(walk.face());
         let position = walk.point().as_vec3();
         let (_, opacity) = scene.base_color(material, None, position, normal.as_vec3(), 0.0);
         let opacity = material.effective_opacity(opacity).min(1.0);
@@ -286,7 +290,7 @@ impl World {
         let (walk, face) = (&met.walk, met.walk.face());
         let origin = walk.point();
         let material = self.scene.material(&self.scene.objects[item.object], usize::from(met.value) - 1);
-        let outward = DVec3::AXES[face / 2] * if face % 2 == 0 { -1.0 } else { 1.0 };
+        let outward = outward(face);
         let (color, opacity) =
             self.scene.base_color(material, None, origin.as_vec3(), outward.as_vec3(), 0.0);
         let position = ray.at(met.place.t);

@@ -175,7 +175,7 @@ impl Walk {
                 (start, entered) = (Moment { t: ray.plane(a, low), axis: a }, Some(a));
             }
         }
-        if !(start.t < f64::INFINITY) {
+        if start.t == f64::INFINITY {
             return None;
         }
         let mut cell = low;
