@@ -44,6 +44,11 @@
 //!   gradient (falling values outward, facing the viewer) as normal. Where the gradient is below 1/1000 of
 //!   the field's range a spacing, the diffuse term counts half for every light and nothing is mirrored.
 
+#![expect(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "`!(x > 0.0)` is meant as written: what is not a number must fail the test too"
+)]
+
 mod bvh;
 mod lights;
 mod line;
