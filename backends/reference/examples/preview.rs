@@ -85,7 +85,7 @@ fn scene() -> Result<Scene, String> {
     let mirror = scene.add_material(Material { reflectivity: 0.8, specular: 0.8, ..color(0.6, 0.6, 0.65) });
     let glass = scene.add_material(Material { opacity: 0.35, reflectivity: 0.15, ..color(0.3, 0.7, 0.4) });
     let leaf = scene.add_material(color(0.25, 0.5, 0.15));
-    let lava = scene.add_material(Material { emission: Vec3::new(2.5, 0.9, 0.2), ..color(0.9, 0.4, 0.1) });
+    let lava = scene.add_material(Material { emission: Vec3::new(25.0, 9.0, 2.0), ..color(0.9, 0.4, 0.1) });
     let smoke = scene.add_material(Material { specular: 0.1, ..color(1.0, 1.0, 1.0) });
 
     let body = |p: Primitive| Shape::Primitive(p);

@@ -9,9 +9,9 @@ use polyptych_core::math::Aabb;
 use std::ops::Range;
 
 const BINS: usize = 16;
-/// From this depth on nodes are split at the median, so that a tree of 2^32 boxes is at most 80 deep.
-const SAH_DEPTH: u32 = 48;
-const STACK: usize = 96;
+/// From this depth on nodes are split at the median, so that a tree of 2^32 boxes is at most 64 deep.
+const SAH_DEPTH: u32 = 32;
+const STACK: usize = 66;
 /// Widens the box test: covers the rounding of a subtraction and a product by far, and any hit test's.
 const SLACK: f64 = 1e-13;
 
@@ -131,16 +131,16 @@ impl Bvh {
         }
         let slabs = Slabs::new(line);
         let mut before = before;
-        let mut stack = [(0u32, 0.0f64); STACK];
+        let mut stack = [(0u32, 0.0f32); STACK];
         let mut height = 0;
         if let Some(near) = slabs.enter(&self.nodes[0], after, before) {
-            stack[0] = (0, near);
+            stack[0] = (0, round_down(near));
             height = 1;
         }
         while height > 0 {
             height -= 1;
             let (at, near) = stack[height];
-            if near > before {
+            if f64::from(near) > before {
                 continue;
             }
             let node = &self.nodes[at as usize];
@@ -156,7 +156,7 @@ impl Bvh {
                 (l, r) => (l, r),
             };
             for child in [second, first].into_iter().flatten() {
-                stack[height] = child;
+                stack[height] = (child.0, round_down(child.1));
                 height += 1;
             }
         }

@@ -300,7 +300,7 @@ mod tests {
             Voxels::from_fn(size, |x, y, z| u8::from(hash(x, y, z).is_multiple_of(15) && (x < 6 || z > 62)));
         let mut s = 99;
         let mut hits = 0;
-        for i in 0..3000 {
+        for i in 0..1500 {
             let mut v = || DVec3::new(random(&mut s), random(&mut s), random(&mut s));
             let extent = DVec3::new(70.0, 9.0, 66.0);
             let (mut origin, target) = ((v() * 3.0 - 1.0) * extent, v() * extent);
@@ -322,7 +322,7 @@ mod tests {
                 other => panic!("{other:?} for {line:?}"),
             }
         }
-        assert!(hits > 500, "{hits}");
+        assert!(hits > 250, "{hits}");
     }
 
     #[test]
