@@ -85,7 +85,7 @@ fn scene() -> Result<Scene, String> {
     let mirror = scene.add_material(Material { reflectivity: 0.8, specular: 0.8, ..color(0.6, 0.6, 0.65) });
     let glass = scene.add_material(Material { opacity: 0.35, reflectivity: 0.15, ..color(0.3, 0.7, 0.4) });
     let leaf = scene.add_material(color(0.25, 0.5, 0.15));
-    let lava = scene.add_material(Material { emission: Vec3::new(2.5, 0.9, 0.2), ..color(0.9, 0.4, 0.1) });
+    let lava = scene.add_material(Material { emission: Vec3::new(40.0, 14.0, 3.0), ..color(0.9, 0.4, 0.1) });
     let smoke = scene.add_material(Material { specular: 0.1, ..color(1.0, 1.0, 1.0) });
 
     let body = |p: Primitive| Shape::Primitive(p);
@@ -110,7 +110,7 @@ fn scene() -> Result<Scene, String> {
     add("flat mesh", Shape::Mesh(ball(6, 9, false)), gold, [4.6, 0.6, -2.4]);
     let voxels = Voxels::from_fn([12, 12, 12], |x, y, z| {
         let r2 = [x, y, z].iter().map(|&c| (f64::from(c) - 5.5).powi(2)).sum::<f64>();
-        if r2 < 8.0 {
+        if r2 < 1.0 {
             2
         } else if r2 < 36.0 && !(x > 5 && z > 5) {
             1

@@ -9,10 +9,9 @@ use polyptych_core::math::Aabb;
 use std::ops::Range;
 
 const BINS: usize = 16;
-const LEAF: usize = 4;
-/// From this depth on nodes are split at the median, so that a tree of 2^32 boxes is at most 80 deep.
-const SAH_DEPTH: u32 = 48;
-const STACK: usize = 96;
+/// From this depth on nodes are split at the median, so that a tree of 2^32 boxes is at most 64 deep.
+const SAH_DEPTH: u32 = 32;
+const STACK: usize = 66;
 /// Widens the box test: covers the rounding of a subtraction and a product by far, and any hit test's.
 const SLACK: f64 = 1e-13;
 
@@ -87,8 +86,8 @@ impl Hull {
 }
 
 impl Bvh {
-    /// Sorts boxes into a tree.
-    pub(crate) fn build(mut boxes: Vec<Bounded>) -> Self {
+    /// Sorts boxes into a tree with at most `leaf` boxes in a leaf: 1 where what is in a box is dear to test.
+    pub(crate) fn build(mut boxes: Vec<Bounded>, leaf: usize) -> Self {
         let mut nodes = Vec::with_capacity(boxes.len() + 1);
         if boxes.is_empty() {
             return Self::default();
@@ -96,7 +95,7 @@ impl Bvh {
         nodes.push(node_over(&boxes, 0));
         let mut open = vec![(0usize, 0..boxes.len(), 0u32)];
         while let Some((at, range, depth)) = open.pop() {
-            let Some(middle) = split(&mut boxes[range.clone()], depth) else { continue };
+            let Some(middle) = split(&mut boxes[range.clone()], depth, leaf) else { continue };
             let middle = range.start + middle;
             let first = nodes.len();
             nodes.push(node_over(&boxes[range.start..middle], range.start));
@@ -132,16 +131,16 @@ impl Bvh {
         }
         let slabs = Slabs::new(line);
         let mut before = before;
-        let mut stack = [(0u32, 0.0f64); STACK];
+        let mut stack = [(0u32, 0.0f32); STACK];
         let mut height = 0;
         if let Some(near) = slabs.enter(&self.nodes[0], after, before) {
-            stack[0] = (0, near);
+            stack[0] = (0, round_down(near));
             height = 1;
         }
         while height > 0 {
             height -= 1;
             let (at, near) = stack[height];
-            if near > before {
+            if f64::from(near) > before {
                 continue;
             }
             let node = &self.nodes[at as usize];
@@ -157,7 +156,7 @@ impl Bvh {
                 (l, r) => (l, r),
             };
             for child in [second, first].into_iter().flatten() {
-                stack[height] = child;
+                stack[height] = (child.0, round_down(child.1));
                 height += 1;
             }
         }
@@ -171,7 +170,7 @@ fn node_over(boxes: &[Bounded], first: usize) -> Node {
 }
 
 /// Parts boxes in two and returns where the second part begins; nothing for a leaf.
-fn split(boxes: &mut [Bounded], depth: u32) -> Option<usize> {
+fn split(boxes: &mut [Bounded], depth: u32, leaf: usize) -> Option<usize> {
     if boxes.len() <= 1 {
         return None;
     }
@@ -186,7 +185,7 @@ fn split(boxes: &mut [Bounded], depth: u32) -> Option<usize> {
         && let Some((axis, bin, cost)) = cheapest_split(boxes, &centers)
     {
         // A leaf costs a test for each box, a split two box tests more.
-        if boxes.len() <= LEAF && cost + hull.area() * 1.5 >= hull.area() * boxes.len() as f32 {
+        if boxes.len() <= leaf && cost + hull.area() * 1.5 >= hull.area() * boxes.len() as f32 {
             return None;
         }
         let bins = Binning::new(&centers, axis);
@@ -195,7 +194,7 @@ fn split(boxes: &mut [Bounded], depth: u32) -> Option<usize> {
             return Some(middle);
         }
     }
-    if boxes.len() <= LEAF {
+    if boxes.len() <= leaf {
         return None;
     }
     let extent = |a: usize| centers.max[a] - centers.min[a];
@@ -330,7 +329,7 @@ mod tests {
                 Aabb::new(c - h, c + h)
             })
             .collect();
-        let tree = Bvh::build(boxes.iter().enumerate().map(|(i, b)| Bounded::new(b, i)).collect());
+        let tree = Bvh::build(boxes.iter().enumerate().map(|(i, b)| Bounded::new(b, i)).collect(), 3);
         let mut order = tree.order().to_vec();
         order.sort_unstable();
         assert!(order.iter().enumerate().all(|(i, &o)| i == o as usize));

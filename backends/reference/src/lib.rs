@@ -13,6 +13,7 @@
 //!   lower triangle wins.
 //! - **Normals** face the viewer: where the true (geometric) normal points away, both it and the shading
 //!   normal are turned. The channel holds the shading normal, interpolated where a mesh has normals.
+//! - Pixels where the projection sees nothing (outside of a fisheye's circle) are black.
 //! - An eye inside a solid sees the solid's inner side; inside a filled voxel it sees that voxel at distance 0.
 //!
 //! # Light
@@ -39,10 +40,15 @@
 //!   is cut into equal steps no longer than `volume.step` times the smallest spacing in world units, and the
 //!   field is read in the middle of each. Opacity is that of the transfer function for the step's length in
 //!   object space. Where volumes overlap, all are read at the same places with the smaller step, in the order of
-//!   the objects.
+//!   the objects. What lies behind 96 stretches of one ray in volumes is left out.
 //! - The color of a sample is the transfer color lit without shadows by the material of slot 0, with the
 //!   gradient (falling values outward, facing the viewer) as normal. Where the gradient is below 1/1000 of
 //!   the field's range a spacing, the diffuse term counts half for every light and nothing is mirrored.
+
+#![expect(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "`!(x > 0.0)` is meant as written: what is not a number must fail the test too"
+)]
 
 mod bvh;
 mod lights;

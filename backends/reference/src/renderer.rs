@@ -223,7 +223,7 @@ impl Renderer for Reference {
             }
             let key = address(&object.shape);
             let geometry = built.entry(key).or_insert_with(|| {
-                self.built.remove(&key).unwrap_or_else(|| Arc::new(Geometry::new(&object.shape)))
+                self.built.get(&key).cloned().unwrap_or_else(|| Arc::new(Geometry::new(&object.shape)))
             });
             match &*object.shape {
                 Shape::Volume(_) => clouds.push(Cloud::new(scene, index, geometry.clone())),
@@ -257,12 +257,7 @@ impl Renderer for Reference {
         let ready = self.ready.as_ref().ok_or(RenderError::NotPrepared)?;
         let mut phases = Phases::start();
         let view = frame.camera.view(target.width(), target.height());
-        let painter = Painter {
-            ready,
-            view,
-            channels: target.channels(),
-            background: ready.world.scene.environment.background.color(frame.camera.forward()),
-        };
+        let painter = Painter { ready, view, channels: target.channels() };
         let (rays, shadow_rays) = (AtomicU64::new(0), AtomicU64::new(0));
         let stopped = AtomicBool::new(false);
         target.for_each_band(control.threads, ROWS, &|mut band| {
@@ -305,8 +300,6 @@ struct Painter<'a> {
     ready: &'a Ready,
     view: View<'a>,
     channels: Channels,
-    /// Color of pixels whose projection sees nothing.
-    background: Vec3,
 }
 
 impl Painter<'_> {
@@ -335,7 +328,7 @@ impl Painter<'_> {
         let mut pixel = if geometry || samples <= 1 {
             self.sample(tracer, x, y, (0.5, 0.5), center)
         } else {
-            Pixel::background(self.background)
+            Pixel::background(Vec3::ZERO)
         };
         if samples > 1 && (color || coverage) {
             let (mut sum, mut hits) = (glam::DVec3::ZERO, 0u32);
@@ -354,7 +347,7 @@ impl Painter<'_> {
     fn sample(&self, tracer: &Tracer<'_>, x: u32, y: u32, place: (f64, f64), wants: Wants) -> Pixel {
         match self.view.ray(f64::from(x) + place.0, f64::from(y) + place.1) {
             Some(ray) => tracer.look(&ray, wants),
-            None => Pixel::background(self.background),
+            None => Pixel::background(Vec3::ZERO),
         }
     }
 }

@@ -120,7 +120,7 @@ impl Item {
 impl World {
     pub(crate) fn new(scene: Arc<Scene>, items: Vec<Item>, clouds: Vec<Cloud>, lamps: Vec<Lamp>) -> Self {
         let boxes = items.iter().enumerate().map(|(i, item)| Bounded::new(&item.bounds, i)).collect();
-        Self { scene, items, tree: Bvh::build(boxes), clouds, lamps }
+        Self { scene, items, tree: Bvh::build(boxes, 1), clouds, lamps }
     }
 
     /// Returns the bytes held without what geometries hold.

@@ -245,7 +245,7 @@ mod tests {
         let blocks = Blocks::new(&field);
         let mut s = 17;
         let mut hits = 0;
-        for _ in 0..3000 {
+        for _ in 0..500 {
             let mut v = || DVec3::new(random(&mut s), random(&mut s), random(&mut s));
             let origin = v() * DVec3::new(4.0, 2.0, 4.0);
             let target = v() * DVec3::new(2.9, 0.3, 2.4);
@@ -257,8 +257,8 @@ mod tests {
                 let inside = p.x.abs() <= 3.0 && p.z.abs() <= 2.5;
                 inside.then(|| p.y - field.height_and_normal(p.x, p.z).0)
             };
-            let step = 5e-4;
-            let crossed = (0..24_000).map(|i| f64::from(i) * step).find(
+            let step = 1e-3;
+            let crossed = (0..12_000).map(|i| f64::from(i) * step).find(
                 |&t| matches!((above(t), above(t + step)), (Some(a), Some(b)) if (a >= 0.0) != (b >= 0.0)),
             );
             if let Some(hit) = found {
@@ -273,7 +273,7 @@ mod tests {
                 hits += 1;
             }
         }
-        assert!(hits > 1500, "{hits}");
+        assert!(hits > 250, "{hits}");
     }
 
     fn near_border(field: &HeightField, p: DVec3) -> bool {

@@ -21,8 +21,8 @@ pub(crate) struct MeshTree {
 impl MeshTree {
     pub(crate) fn new(mesh: &Mesh) -> Self {
         let finite = (0..mesh.triangles.len()).filter(|&t| mesh.corners(t).iter().all(|c| c.is_finite()));
-        let bounds = |t: usize| Aabb::of_points(mesh.corners(t).map(|c| c.as_dvec3()));
-        let tree = Bvh::build(finite.map(|t| Bounded::new(&bounds(t), t)).collect());
+        let bounds = |t: usize| Aabb::of_points(mesh.corners(t).map(Vec3::as_dvec3));
+        let tree = Bvh::build(finite.map(|t| Bounded::new(&bounds(t), t)).collect(), 4);
         let corners = tree.order().iter().map(|&t| mesh.corners(t as usize)).collect();
         Self { tree, corners }
     }

@@ -1,6 +1,7 @@
 //! How is each kind of shape met by a ray in its own space?
 
 pub(crate) mod form;
+mod function;
 mod height_field;
 mod mesh;
 mod primitive;
@@ -69,7 +70,7 @@ impl Geometry {
             Shape::HeightField(field) => field.heights().len() as u64 * 8 / 12,
             Shape::Volume(volume) => volume.samples().len() as u64 / 512,
             Shape::Primitive(body) => body.faces().len() as u64 * 32,
-            Shape::FreeForm(form) => form.form().node_count() as u64 * size_of::<form::Function>() as u64,
+            Shape::FreeForm(form) => form.form().node_count() as u64 * size_of::<function::Function>() as u64,
             Shape::Voxels(_) => 0,
         }
     }

@@ -179,14 +179,14 @@ impl Walk {
     /// Goes to the first cell behind the chunk, the same that single steps would reach.
     fn leave_chunk(&mut self) -> bool {
         let chunk = i64::from(CHUNK);
-        let mut exits = [f64::INFINITY; 3];
-        for a in 0..3 {
+        let exits: [f64; 3] = std::array::from_fn(|a| {
             let first = self.cell[a] / chunk * chunk;
-            if self.direction[a] != 0.0 {
-                let end = (first + chunk).min(self.size[a]);
-                exits[a] = self.plane(a, if self.direction[a] < 0.0 { first } else { end });
+            let end = (first + chunk).min(self.size[a]);
+            match self.direction[a] {
+                0.0 => f64::INFINITY,
+                d => self.plane(a, if d < 0.0 { first } else { end }),
             }
-        }
+        });
         let out = Self::nearest_axis(&exits);
         let t = exits[out];
         if !t.is_finite() {
@@ -297,10 +297,10 @@ mod tests {
         let size = [70, 9, 66];
         // Two far clusters: several chunks are empty.
         let voxels =
-            Voxels::from_fn(size, |x, y, z| u8::from(hash(x, y, z).is_multiple_of(50) && (x < 6 || z > 62)));
+            Voxels::from_fn(size, |x, y, z| u8::from(hash(x, y, z).is_multiple_of(15) && (x < 6 || z > 62)));
         let mut s = 99;
         let mut hits = 0;
-        for i in 0..3000 {
+        for i in 0..1500 {
             let mut v = || DVec3::new(random(&mut s), random(&mut s), random(&mut s));
             let extent = DVec3::new(70.0, 9.0, 66.0);
             let (mut origin, target) = ((v() * 3.0 - 1.0) * extent, v() * extent);
@@ -322,7 +322,7 @@ mod tests {
                 other => panic!("{other:?} for {line:?}"),
             }
         }
-        assert!(hits > 500, "{hits}");
+        assert!(hits > 250, "{hits}");
     }
 
     #[test]

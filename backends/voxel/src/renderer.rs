@@ -1,0 +1,329 @@
+//! How does the host drive the voxel back end: plan, prepare, render?
+
+use crate::grid::{Chunks, Grid};
+use crate::lamps::Lamp;
+use crate::model::{self, Model};
+use crate::occupancy::{Occupancy, Values};
+use crate::trace::{Shadows, Tracer, Wants};
+use crate::world::{Counts, Item, World};
+use glam::Vec3;
+use polyptych_core::camera::View;
+use polyptych_core::convert::Converter;
+use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
+use polyptych_core::scene::{AlphaMode, Chunk, Object, Scene, Shape, ShapeKind};
+use polyptych_core::seam::{
+    BackendFactory, BackendInfo, Control, Counter, Decision, Frame, Need, ObjectPlan, Parameter,
+    ParameterKind, PassPlan, Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Value,
+};
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Edge of a tile in pixels, and rows of a band: rays of a tile meet the same chunks.
+const TILE: u32 = 16;
+
+/// Makes instances of [`Voxel`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl BackendFactory for Factory {
+    fn info(&self) -> BackendInfo {
+        info()
+    }
+
+    fn create(&self, _registry: &Registry) -> Box<dyn Renderer> {
+        Box::new(Voxel::new())
+    }
+}
+
+/// The voxel back end: walks grids in exact order. See the crate's documentation for its method.
+#[derive(Debug)]
+pub struct Voxel {
+    info: BackendInfo,
+    ready: Option<Ready>,
+    chunks: Chunks,
+}
+
+#[derive(Debug)]
+struct Ready {
+    world: World,
+    is_converted: bool,
+    decisions: Arc<[Decision]>,
+    bytes: u64,
+    bounces: u32,
+    shadows: Shadows,
+    chunks_built: u64,
+}
+
+impl Default for Voxel {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Voxel {
+    /// Makes an instance that has nothing prepared.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { info: info(), ready: None, chunks: Chunks::default() }
+    }
+
+    fn resolution(&self, need: &Need) -> u32 {
+        need.settings.int(&self.info.parameters, "detail.resolution").clamp(16, 1024) as u32
+    }
+
+    fn shadows(&self, need: &Need) -> Shadows {
+        if need.settings.bool(&self.info.parameters, "shadow") { Shadows::Hard } else { Shadows::Off }
+    }
+
+    /// Makes the grids of a model ready; objects of one shape share theirs where their materials let through
+    /// the same.
+    fn items(&mut self, model: &Model, control: &Control<'_>) -> Result<(Vec<Item>, u64), RenderError> {
+        let scene = &model.scene;
+        let mut grids: HashMap<(usize, Values, Values), Arc<Grid>> = HashMap::new();
+        let mut items = Vec::new();
+        for (index, (object, decision)) in scene.objects.iter().zip(&model.decisions).enumerate() {
+            control.check()?;
+            let Some(voxels) = model::grid_of(object, decision) else { continue };
+            let material = |value: u8| scene.material(object, usize::from(value) - 1);
+            let seen = Values::of(|v| material(v).opacity > 0.0);
+            let blocking =
+                Values::of(|v| material(v).opacity >= 1.0 && material(v).alpha != AlphaMode::Blend);
+            let without_holes =
+                (1..=255).all(|v| material(v).alpha == AlphaMode::Opaque || material(v).texture.is_none());
+            let key = (Arc::as_ptr(&object.shape).addr(), seen, blocking);
+            let grid = grids
+                .entry(key)
+                .or_insert_with(|| Arc::new(self.chunks.grid(voxels, seen, blocking, control.threads)));
+            items.push(Item::new(scene, index, grid.clone(), without_holes));
+        }
+        Ok((items, grids.values().map(|g| g.bytes()).sum()))
+    }
+}
+
+fn info() -> BackendInfo {
+    BackendInfo {
+        id: "voxel".to_owned(),
+        name: "Voxel ray caster".to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        native: vec![ShapeKind::Voxels],
+        channels: Channels::ALL,
+        photometric: true,
+        parameters: vec![
+            Parameter {
+                name: "detail.resolution",
+                kind: ParameterKind::Int { min: 16, max: 1024 },
+                default: Value::Int(192),
+                unit: "cells",
+                help: "Most cells along the longest edge of an object that is converted",
+                tag: "detail.tolerance",
+                quality_axis: true,
+            },
+            Parameter {
+                name: "bounces",
+                kind: ParameterKind::Int { min: 0, max: 8 },
+                default: Value::Int(2),
+                unit: "",
+                help: "How often a ray is mirrored",
+                tag: "bounces",
+                quality_axis: false,
+            },
+            Parameter {
+                name: "shadow",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(true),
+                unit: "",
+                help: "Whether opaque voxels block light",
+                tag: "shadow",
+                quality_axis: false,
+            },
+        ],
+    }
+}
+
+impl Renderer for Voxel {
+    fn info(&self) -> &BackendInfo {
+        &self.info
+    }
+
+    fn plan(&self, scene: &Scene, need: &Need) -> Plan {
+        let resolution = self.resolution(need);
+        let mut seen = HashSet::new();
+        let objects: Vec<ObjectPlan> = scene
+            .objects
+            .iter()
+            .map(|object| {
+                let is_new = seen.insert(Arc::as_ptr(&object.shape).addr());
+                plan_object(scene, object, need, resolution, is_new)
+            })
+            .collect();
+        let bytes = objects.iter().map(|o| o.bytes).sum();
+        let casting = scene.all_lights().iter().filter(|l| l.casts_shadow).count();
+        let is_lit = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
+        let shadows = self.shadows(need);
+        let is_shadowed = is_lit && casting > 0 && shadows == Shadows::Hard;
+        let passes = vec![
+            PassPlan {
+                name: "primary rays".to_owned(),
+                needed: true,
+                why: "one through the middle of each pixel".to_owned(),
+            },
+            PassPlan {
+                name: "shadow rays".to_owned(),
+                needed: is_shadowed,
+                why: match (is_lit, casting, shadows) {
+                    (false, _, _) => "neither color nor shadow is asked for".to_owned(),
+                    (_, 0, _) => "no light casts a shadow".to_owned(),
+                    (_, _, Shadows::Off) => "shadows are switched off".to_owned(),
+                    (_, n, Shadows::Hard) => format!("{n} lights cast shadows"),
+                },
+            },
+        ];
+        let rays = f64::from(need.width) * f64::from(need.height);
+        let shadow_rays = if is_shadowed { rays * casting as f64 } else { 0.0 };
+        // A ray takes about 0.1 microseconds on one core; shadow rays leave half of the pixels.
+        Plan { objects, passes, bytes, estimated_ms: (rays + 0.5 * shadow_rays) * 1e-4 }
+    }
+
+    fn prepare(
+        &mut self,
+        scene: &Arc<Scene>,
+        need: &Need,
+        converter: &Converter,
+        control: &Control<'_>,
+    ) -> Result<Prepared, RenderError> {
+        self.ready = None;
+        let model = model::build(scene, need, self.resolution(need), converter, control)?;
+        self.chunks.begin();
+        let (items, grid_bytes) = self.items(&model, control)?;
+        self.chunks.end();
+        // The lights are those of the scene as given: a shape that was turned into voxels gives off no more light
+        // than before.
+        let world = World::new(model.scene, items, Lamp::all(scene));
+        let bytes = world.bytes() + grid_bytes + self.chunks.bytes();
+        let decisions: Arc<[Decision]> = model.decisions.into();
+        self.ready = Some(Ready {
+            world,
+            is_converted: model.is_converted,
+            decisions: decisions.clone(),
+            bytes,
+            bounces: need.settings.int(&self.info.parameters, "bounces").clamp(0, 8) as u32,
+            shadows: self.shadows(need),
+            chunks_built: self.chunks.built,
+        });
+        Ok(Prepared { objects: decisions, bytes })
+    }
+
+    fn model(&self) -> Option<Arc<Scene>> {
+        self.ready.as_ref().filter(|r| r.is_converted).map(|r| r.world.scene.clone())
+    }
+
+    fn render(
+        &mut self,
+        frame: &Frame,
+        target: &mut Framebuffer,
+        control: &Control<'_>,
+    ) -> Result<Report, RenderError> {
+        let ready = self.ready.as_ref().ok_or(RenderError::NotPrepared)?;
+        let mut phases = Phases::start();
+        let painter = Painter {
+            view: frame.camera.view(target.width(), target.height()),
+            wants: wants(target.channels()),
+            unseen: ready.world.scene.environment.background.color(frame.camera.forward()),
+        };
+        let [rays, shadow_rays, steps] = [const { AtomicU64::new(0) }; 3];
+        let stopped = AtomicBool::new(false);
+        target.for_each_band(control.threads, TILE, &|mut band| {
+            let tracer = Tracer {
+                world: &ready.world,
+                bounces: ready.bounces,
+                shadows: ready.shadows,
+                counts: Counts::default(),
+            };
+            let is_done = painter.paint(&tracer, &mut band, control);
+            rays.fetch_add(tracer.counts.rays.get(), Ordering::Relaxed);
+            shadow_rays.fetch_add(tracer.counts.shadow_rays.get(), Ordering::Relaxed);
+            steps.fetch_add(tracer.counts.steps.get(), Ordering::Relaxed);
+            if is_done {
+                control.finished(&band);
+            } else {
+                stopped.store(true, Ordering::Relaxed);
+            }
+        });
+        if stopped.into_inner() {
+            return Err(RenderError::Cancelled);
+        }
+        phases.end("trace");
+        let counter = |name, count| Some(Counter { name, count });
+        let counters = [
+            counter("rays", rays.into_inner()),
+            counter("shadow rays", shadow_rays.into_inner()),
+            counter("steps", steps.into_inner()),
+            counter("chunks built", ready.chunks_built),
+            None,
+            None,
+        ];
+        Ok(Report { objects: ready.decisions.clone(), phases, counters, bytes: ready.bytes })
+    }
+}
+
+fn plan_object(scene: &Scene, object: &Object, need: &Need, resolution: u32, is_new: bool) -> ObjectPlan {
+    let plan = |decision, builds, bytes| ObjectPlan {
+        name: object.name.clone(),
+        shape: object.shape.kind().name(),
+        decision,
+        builds,
+        bytes,
+    };
+    if let Some(why) = model::why_skipped(object) {
+        return plan(Decision::Skipped { why }, String::new(), 0);
+    }
+    if let Shape::Voxels(voxels) = &*object.shape {
+        let filled = voxels.chunks().iter().filter(|c| !matches!(c, Chunk::Uniform(0))).count();
+        let (builds, bytes) = if is_new {
+            (format!("masks of {filled} chunks"), filled as u64 * size_of::<Occupancy>() as u64)
+        } else {
+            (String::new(), 0)
+        };
+        return plan(Decision::Exact, builds, bytes);
+    }
+    let detail = model::detail(object, need, resolution);
+    let forecast = Converter::default().voxels_forecast(scene, object, detail);
+    let decision = model::converted(&object.shape, forecast.bound, &forecast.builds);
+    plan(decision, forecast.builds, forecast.bytes)
+}
+
+/// Returns what must be found out for some channels; what is not asked for is not computed.
+fn wants(channels: Channels) -> Wants {
+    Wants { color: channels.has(Channel::Color), shadow: channels.has(Channel::Shadow) }
+}
+
+/// Draws bands of a picture.
+struct Painter<'a> {
+    view: View<'a>,
+    wants: Wants,
+    /// Color of pixels whose projection sees nothing.
+    unseen: Vec3,
+}
+
+impl Painter<'_> {
+    /// Draws a band tile by tile; false where the host stopped it.
+    fn paint(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
+        for first in (0..band.width).step_by(TILE as usize) {
+            if control.is_cancelled() {
+                return false;
+            }
+            for row in 0..band.rows {
+                for x in first..(first + TILE).min(band.width) {
+                    let (u, v) = (f64::from(x) + 0.5, f64::from(band.first_row + row) + 0.5);
+                    let pixel = match self.view.ray(u, v) {
+                        Some(ray) => tracer.look(ray, self.wants),
+                        None => Pixel::background(self.unseen),
+                    };
+                    band.put(x, row, &pixel);
+                }
+            }
+        }
+        true
+    }
+}
