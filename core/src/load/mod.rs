@@ -18,6 +18,7 @@ mod obj_parts;
 mod obj_scene;
 mod ply;
 mod polygon;
+pub mod scene_file;
 mod smooth;
 mod source;
 mod stl;
@@ -28,13 +29,12 @@ mod vox;
 
 pub use error::LoadError;
 pub use limits::{Limits, LoadOptions, RawVolume, SampleFormat};
+pub use scene_file::{SaveError, SceneFile, json_schema, save};
 
 use crate::camera::{Camera, Projection};
 use crate::scene::{Light, Material, Object, Scene, Shape};
-use error::{Fault, one_line};
-use folder::Folder;
+use error::Fault;
 use glam::DVec3;
-use notes::Notes;
 use source::Source;
 use std::path::Path;
 
@@ -56,22 +56,12 @@ use std::path::Path;
 /// assert_eq!((scene.objects.len(), scene.lights.len(), scene.cameras.len()), (1, 1, 1));
 /// ```
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
-    let extension = extension_of(path);
-    let read = reader_of(&extension, options).map_err(|fault| fault.in_file(path))?;
-    let name = one_line(&path.file_stem().unwrap_or_default().to_string_lossy());
-    let mut source = Source {
-        name: name.clone(),
-        extension,
-        bytes: folder::read_file(path, options.limits.file_bytes)?,
-        folder: Folder::of(path, options.limits.file_bytes),
-        options,
-        limits: &options.limits,
-        notes: Notes::default(),
-    };
+    let read = reader_of(&extension_of(path), options).map_err(|fault| fault.in_file(path))?;
+    let mut source = Source::open(path, options, folder::read_file(path, options.limits.file_bytes)?);
     let mut scene = read(&mut source).map_err(|fault| fault.in_file(path))?;
     scene.notes.extend(source.notes.into_lines());
     if scene.name.is_empty() {
-        scene.name = name;
+        scene.name = source.name;
     }
     add_default_view(&mut scene);
     Ok(scene)
@@ -114,6 +104,7 @@ fn extension_of(path: &Path) -> String {
 
 fn reader_of(extension: &str, options: &LoadOptions) -> Result<Reader, Fault> {
     Ok(match extension {
+        "ron" | "json" => scene_file::load,
         "obj" => obj_scene::load,
         "gltf" | "glb" => gltf::load,
         "stl" => stl::load,

@@ -15,6 +15,8 @@ use crate::scene::{Material, Object, Samples, Scene, Shape, TransferFunction, Vo
 use glam::{DAffine3, DMat3, DVec3};
 use samples::{FileFormat, Order};
 
+pub(in crate::load) use samples::unpack;
+
 /// Samples with their size, spacing and orientation.
 struct Grid {
     size: [u32; 3],
@@ -24,7 +26,7 @@ struct Grid {
 }
 
 /// Loads a volume as a scene of one object.
-pub(super) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
+pub(in crate::load) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
     let (volume, world_from_object) = read(source)?;
     let mut scene = Scene::default();
     let material = scene.add_material(Material::new(glam::Vec3::ONE));

@@ -160,7 +160,7 @@ fn collect<T>(
 }
 
 /// Unpacks a whole gzip stream, up to `most` bytes.
-pub(super) fn unpack(bytes: &[u8], most: u64) -> Result<Vec<u8>, Fault> {
+pub(in crate::load) fn unpack(bytes: &[u8], most: u64) -> Result<Vec<u8>, Fault> {
     let mut unpacked = Vec::new();
     let read = MultiGzDecoder::new(bytes).take(most + 1).read_to_end(&mut unpacked);
     read.map_err(|error| Fault::malformed(format!("it cannot be unpacked ({error})")))?;

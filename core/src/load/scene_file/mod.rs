@@ -1,0 +1,26 @@
+//! Reads and writes scene files, in RON and in JSON.
+//!
+//! RON is read and written with two of its extensions: optional fields without `Some`, and variants without a second
+//! pair of brackets: `HeightField(file: "alps.png")`.
+
+use ron::extensions::Extensions;
+
+mod place;
+mod read;
+mod schema;
+mod shape;
+mod write;
+
+pub use schema::{
+    CameraEntry, Color, HeightEntry, LightEntry, LightKindEntry, MaterialEntry, MaterialNames, MeshEntry,
+    ObjectEntry, ProjectionEntry, Scale, SceneFile, ShapeEntry, TextureEntry, TransformEntry, VolumeEntry,
+    json_schema,
+};
+pub use write::{SaveError, save};
+
+pub(super) use read::load;
+
+/// The extensions of RON in scene files.
+fn extensions() -> Extensions {
+    Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES
+}
