@@ -13,8 +13,9 @@ pub trait BuiltinBackends {
 impl BuiltinBackends for Registry {
     fn builtin() -> Self {
         let mut registry = Self::default();
-        let factories: [Arc<dyn BackendFactory>; 3] = [
+        let factories: [Arc<dyn BackendFactory>; 4] = [
             Arc::new(polyptych_reference::Factory),
+            Arc::new(polyptych_voxel::Factory),
             Arc::new(polyptych_freeform::Factory),
             Arc::new(polyptych_stylized::Factory),
         ];
