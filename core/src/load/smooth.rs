@@ -163,7 +163,8 @@ impl Grouping {
         let mean = corners.iter().map(|&c| face(c)).sum::<Vec3>().normalize_or_zero();
         let gentle = corners.iter().all(|&c| face(c) == Vec3::ZERO || face(c).dot(mean) >= self.near);
         if gentle {
-            let normal = weighted(mesh, faces, corners.iter().copied()).unwrap_or(mean);
+            let normal =
+                weighted(mesh, faces, corners.iter().copied()).or(mean.try_normalize()).unwrap_or(Vec3::Y);
             for &corner in corners {
                 let vertex = mesh.triangles[corner as usize / 3][corner as usize % 3] as usize;
                 self.normals[vertex] = normal;
@@ -266,7 +267,7 @@ fn weighted(mesh: &RawMesh, faces: &[Vec3], corners: impl Iterator<Item = u32>) 
             faces[t].as_dvec3() * angle(next - here, last - here)
         })
         .sum();
-    sum.try_normalize().map(|n| n.as_vec3())
+    Some(sum.try_normalize()?.as_vec3())
 }
 
 fn angle(u: DVec3, v: DVec3) -> f64 {
