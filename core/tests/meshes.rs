@@ -126,7 +126,7 @@ fn ply_in_every_encoding_is_the_same_rectangle() {
         let mesh = mesh(&scene);
         assert_eq!((mesh.triangles.len(), mesh.area()), (2, 6.0), "{name}");
         assert!((mesh.colors[0].z - 0.5029).abs() < 1e-3, "colors are sRGB in the file: {}", mesh.colors[0]);
-        for cut in 0..bytes.len() {
+        for cut in (0..bytes.len()).step_by(11).chain([bytes.len() - 3, bytes.len() - 1]) {
             // the text may lack its last line break
             let loaded = folder.load("cut.ply", &bytes[..cut]);
             assert!(loaded.is_err() || cut + 1 == bytes.len(), "{name} cut at {cut} was loaded");

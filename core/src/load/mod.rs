@@ -11,11 +11,8 @@ mod gltf;
 mod height;
 pub mod image;
 mod limits;
-mod mtl;
 mod notes;
 mod obj;
-mod obj_parts;
-mod obj_scene;
 mod ply;
 mod polygon;
 pub mod scene_file;
@@ -105,7 +102,7 @@ fn extension_of(path: &Path) -> String {
 fn reader_of(extension: &str, options: &LoadOptions) -> Result<Reader, Fault> {
     Ok(match extension {
         "ron" | "json" => scene_file::load,
-        "obj" => obj_scene::load,
+        "obj" => obj::load,
         "gltf" | "glb" => gltf::load,
         "stl" => stl::load,
         "ply" => ply::load,

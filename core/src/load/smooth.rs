@@ -8,6 +8,7 @@
 
 use super::surface::RawMesh;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{BuildHasher, RandomState};
 
@@ -19,7 +20,7 @@ pub(crate) const CREASE_DEGREES: f64 = 40.0;
 pub(crate) fn generate_normals(mesh: &mut RawMesh) {
     let points = weld(&mesh.positions);
     let fans = Fans::around(&mesh.triangles, &points);
-    let faces: Vec<Vec3> = mesh.triangles.iter().map(|t| face_normal(mesh, t)).collect();
+    let faces: Vec<Face> = mesh.triangles.par_iter().map(|t| Face::of(mesh, t)).collect();
     let mut grouping = Grouping::new(mesh.positions.len());
     for point in 0..fans.len() {
         grouping.group(mesh, &points, &faces, fans.corners(point));
@@ -158,12 +159,12 @@ impl Grouping {
     }
 
     /// Groups the corners around one point and gives each group's normal to its vertices.
-    fn group(&mut self, mesh: &mut RawMesh, points: &[u32], faces: &[Vec3], corners: &[u32]) {
-        let face = |corner: u32| faces[corner as usize / 3];
+    fn group(&mut self, mesh: &mut RawMesh, points: &[u32], faces: &[Face], corners: &[u32]) {
+        let face = |corner: u32| faces[corner as usize / 3].normal;
         let mean = corners.iter().map(|&c| face(c)).sum::<Vec3>().normalize_or_zero();
         let gentle = corners.iter().all(|&c| face(c) == Vec3::ZERO || face(c).dot(mean) >= self.near);
         if gentle {
-            let normal = weighted(mesh, faces, corners.iter().copied()).unwrap_or(mean);
+            let normal = weighted(faces, corners.iter().copied()).or(mean.try_normalize()).unwrap_or(Vec3::Y);
             for &corner in corners {
                 let vertex = mesh.triangles[corner as usize / 3][corner as usize % 3] as usize;
                 self.normals[vertex] = normal;
@@ -180,7 +181,7 @@ impl Grouping {
         self.members.sort_unstable();
         let members = std::mem::take(&mut self.members);
         for group in members.chunk_by(|a, b| a.0 == b.0) {
-            let normal = weighted(mesh, faces, group.iter().map(|m| m.2)).unwrap_or(Vec3::Y);
+            let normal = weighted(faces, group.iter().map(|m| m.2)).unwrap_or(Vec3::Y);
             for same in group.chunk_by(|a, b| a.1 == b.1) {
                 let vertex = self.vertex_for_group(mesh, same[0].1);
                 self.normals[vertex as usize] = normal;
@@ -193,7 +194,7 @@ impl Grouping {
     }
 
     /// Joins corners whose faces share an edge at the point and meet gently there.
-    fn join_over_edges(&mut self, mesh: &RawMesh, points: &[u32], faces: &[Vec3], corners: &[u32]) {
+    fn join_over_edges(&mut self, mesh: &RawMesh, points: &[u32], faces: &[Face], corners: &[u32]) {
         self.leader.clear();
         self.leader.extend(0..corners.len() as u32);
         self.edges.clear();
@@ -207,7 +208,7 @@ impl Grouping {
         self.edges.sort_unstable();
         for pair in 0..self.edges.len().saturating_sub(1) {
             let ((a, first), (b, second)) = (self.edges[pair], self.edges[pair + 1]);
-            let face = |place: u32| faces[corners[place as usize] as usize / 3];
+            let face = |place: u32| faces[corners[place as usize] as usize / 3].normal;
             let (m, n) = (face(first), face(second));
             if a == b && (m.dot(n) >= self.crease || m == Vec3::ZERO || n == Vec3::ZERO) {
                 let (x, y) = (find(&mut self.leader, first), find(&mut self.leader, second));
@@ -256,17 +257,31 @@ fn find(leader: &mut [u32], mut place: u32) -> u32 {
     place
 }
 
+/// What the grouping needs to know of a triangle.
+struct Face {
+    /// Unit normal; zero for triangles without area.
+    normal: Vec3,
+    /// Angles at the corners.
+    angles: [f32; 3],
+}
+
+impl Face {
+    fn of(mesh: &RawMesh, t: &[u32; 3]) -> Self {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        let angles = [angle(b - a, c - a), angle(c - b, a - b), angle(a - c, b - c)].map(|a| a as f32);
+        Self { normal: face_normal(mesh, t), angles }
+    }
+}
+
 /// Returns the mean of the faces' normals weighted by the angles of the corners, if it points anywhere.
-fn weighted(mesh: &RawMesh, faces: &[Vec3], corners: impl Iterator<Item = u32>) -> Option<Vec3> {
+fn weighted(faces: &[Face], corners: impl Iterator<Item = u32>) -> Option<Vec3> {
     let sum: DVec3 = corners
         .map(|corner| {
-            let (t, k) = (corner as usize / 3, corner as usize % 3);
-            let p = |i: usize| mesh.positions[mesh.triangles[t][i] as usize];
-            let (here, next, last) = (p(k), p((k + 1) % 3), p((k + 2) % 3));
-            faces[t].as_dvec3() * angle(next - here, last - here)
+            let face = &faces[corner as usize / 3];
+            face.normal.as_dvec3() * f64::from(face.angles[corner as usize % 3])
         })
         .sum();
-    sum.try_normalize().map(|n| n.as_vec3())
+    Some(sum.try_normalize()?.as_vec3())
 }
 
 fn angle(u: DVec3, v: DVec3) -> f64 {

@@ -160,7 +160,7 @@ fn convert(entry: &MaterialEntry, index: usize) -> Material {
     }
     match entry.alpha_mode.as_deref() {
         Some("MASK") => {
-            material.alpha = AlphaMode::Mask(share(entry.alpha_cutoff.unwrap_or(0.5)) / alpha.max(1e-3))
+            material.alpha = AlphaMode::Mask(share(entry.alpha_cutoff.unwrap_or(0.5)) / alpha.max(1e-3));
         }
         Some("BLEND") => {
             material.alpha = AlphaMode::Blend;

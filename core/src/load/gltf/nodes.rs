@@ -138,7 +138,8 @@ pub(super) fn add_camera(
     let up = world_from_node.transform_vector3(DVec3::Y);
     let right = up.cross(backward).normalize_or_zero();
     let world_from_camera = DMat3::from_cols(right, backward.cross(right), backward);
-    if !eye.is_finite() || !((world_from_camera.determinant() - 1.0).abs() < 1e-6) {
+    let is_frame = (world_from_camera.determinant() - 1.0).abs() < 1e-6;
+    if !(eye.is_finite() && is_frame) {
         return false;
     }
     let name = entry.name.as_deref().map(one_line).filter(|n| !n.is_empty()).unwrap_or(name);

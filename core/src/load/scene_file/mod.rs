@@ -8,14 +8,14 @@ use ron::extensions::Extensions;
 mod place;
 mod read;
 mod schema;
+mod schema_shapes;
+mod schema_views;
 mod shape;
 mod write;
 
-pub use schema::{
-    CameraEntry, Color, HeightEntry, LightEntry, LightKindEntry, MaterialEntry, MaterialNames, MeshEntry,
-    ObjectEntry, ProjectionEntry, Scale, SceneFile, ShapeEntry, TextureEntry, TransformEntry, VolumeEntry,
-    json_schema,
-};
+pub use schema::{Color, MaterialEntry, MaterialNames, ObjectEntry, SceneFile, TextureEntry, json_schema};
+pub use schema_shapes::{HeightEntry, MeshEntry, ShapeEntry, VolumeEntry};
+pub use schema_views::{CameraEntry, LightEntry, LightKindEntry, ProjectionEntry, Scale, TransformEntry};
 pub use write::{SaveError, save};
 
 pub(super) use read::load;

@@ -1,6 +1,6 @@
 //! Turns places, lights and cameras of scene files into those of the scene, and back.
 
-use super::schema::{CameraEntry, LightEntry, LightKindEntry, ProjectionEntry, Scale, TransformEntry};
+use super::schema_views::{CameraEntry, LightEntry, LightKindEntry, ProjectionEntry, Scale, TransformEntry};
 use crate::camera::{Camera, Projection};
 use crate::load::error::Fault;
 use crate::scene::{Light, LightKind};

@@ -1,7 +1,8 @@
 //! Builds a scene of a scene file.
 
 use super::place::{camera, light, transform, usage};
-use super::schema::{MaterialEntry, ObjectEntry, SceneFile, ShapeEntry, TextureEntry};
+use super::schema::{MaterialEntry, ObjectEntry, SceneFile, TextureEntry};
+use super::schema_shapes::ShapeEntry;
 use super::shape;
 use crate::load::error::{Fault, one_line};
 use crate::load::image::{TextureMaker, checker};

@@ -3,10 +3,10 @@
 //! Lengths are meters, angles degrees, colors `"#rrggbb"` (sRGB) or three linear numbers. Names tie things together:
 //! an object names its material, a material its texture.
 
+use super::schema_shapes::ShapeEntry;
+use super::schema_views::{CameraEntry, LightEntry, TransformEntry};
 use crate::scene::color_text;
-use crate::scene::{
-    AlphaMode, Environment, Form, Mapping, Material, Primitive, TextureWrap, TransferFunction,
-};
+use crate::scene::{AlphaMode, Environment, Mapping, Material, TextureWrap};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -182,16 +182,16 @@ pub struct ObjectEntry {
     pub required: bool,
 }
 
-fn yes() -> bool {
+pub(super) fn yes() -> bool {
     true
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
-fn is_true(value: &bool) -> bool {
+pub(super) fn is_true(value: &bool) -> bool {
     *value
 }
 
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
@@ -223,249 +223,6 @@ impl MaterialNames {
 
     fn is_empty(&self) -> bool {
         self.names().is_empty()
-    }
-}
-
-/// Geometry.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub enum ShapeEntry {
-    /// A parametric body.
-    Primitive(Primitive),
-    /// A model file (.obj .gltf .glb .stl .ply .vox) with everything in it.
-    Model {
-        /// Its name, relative to the scene file.
-        file: String,
-    },
-    /// Triangles and segments.
-    Mesh(MeshEntry),
-    /// A grid of palette bytes.
-    Voxels {
-        /// Cells along each axis.
-        size: [u32; 3],
-        /// One byte a cell, x fastest, then y, then z, packed by gzip, as base64.
-        cells: String,
-    },
-    /// An implicit function.
-    FreeForm {
-        /// The function, positive inside.
-        form: Form,
-        /// Smallest and largest corner of a box that cuts it off; forms without an end need it.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        bounds: Option<[[f64; 3]; 2]>,
-    },
-    /// Heights over a rectangle.
-    HeightField(HeightEntry),
-    /// A scalar field.
-    Volume(VolumeEntry),
-}
-
-/// Triangles and segments; lists are empty or as long as the positions.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct MeshEntry {
-    /// Corner positions.
-    pub positions: Vec<[f32; 3]>,
-    /// Corner indices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Normals for smooth shading.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates, v = 0 at the top.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub uvs: Vec<[f32; 2]>,
-    /// Vertex colors, linear.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub colors: Vec<[f32; 3]>,
-    /// Material slot of each triangle; empty = all in slot 0.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub slots: Vec<u16>,
-    /// Free segments.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub segments: Vec<[u32; 2]>,
-}
-
-/// Heights over a rectangle, from a picture or in the file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct HeightEntry {
-    /// A gray picture of 8 or 16 bits, relative to the scene file.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub file: Option<String>,
-    /// Heights in rows, all rows of the same length; instead of a file.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub rows: Vec<Vec<f32>>,
-    /// Lengths along x and z; left out, 2 m for the longer side.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub extent: Option<[f64; 2]>,
-    /// Height over the range of values of a picture; left out, a fifth of the longer side.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub height: Option<f64>,
-}
-
-/// A scalar field, from a file or in the file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct VolumeEntry {
-    /// A volume file (.nrrd .nhdr .nii .nii.gz .raw), relative to the scene file.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub file: Option<String>,
-    /// `WxHxD:FORMAT` of a raw file or of `samples`, for example `64x64x32:u8`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub format: Option<String>,
-    /// Samples, x fastest, little-endian, packed by gzip, as base64; instead of a file.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub samples: Option<String>,
-    /// Distance of neighboring samples; left out, that of the file or 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub spacing: Option<[f64; 3]>,
-    /// Turns values into color and opacity; left out, one that suits the range of values.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub transfer: Option<TransferFunction>,
-    /// Draws only what lies inside this form.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shell: Option<Form>,
-}
-
-/// A place: scaled, then rotated, then moved; or a matrix.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct TransformEntry {
-    /// Where the origin goes.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub translate: Option<[f64; 3]>,
-    /// Degrees around x, then around y, then around z (axes of the world).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rotate_deg: Option<[f64; 3]>,
-    /// A rotation as a quaternion `x y z w`, instead of angles.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub quaternion: Option<[f64; 4]>,
-    /// One factor, or one along each axis.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub scale: Option<Scale>,
-    /// The three upper rows of a matrix, instead of all others.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub matrix: Option<[[f64; 4]; 3]>,
-}
-
-/// Factors of a scale.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Scale {
-    /// The same along all axes.
-    Uniform(f64),
-    /// Along x, y and z.
-    Axes(f64, f64, f64),
-}
-
-/// A light source.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LightEntry {
-    /// Where the light comes from.
-    pub kind: LightKindEntry,
-    /// Its color.
-    #[serde(with = "color_text", default = "white")]
-    #[schemars(with = "color_text::ColorText")]
-    pub color: Vec3,
-    /// Factor of the color; for point and spot lights the light at a distance of one meter.
-    #[serde(default = "one")]
-    pub intensity: f32,
-    /// Whether opaque things block it.
-    #[serde(default = "yes", skip_serializing_if = "is_true")]
-    pub casts_shadow: bool,
-}
-
-fn white() -> Vec3 {
-    Vec3::ONE
-}
-fn one() -> f32 {
-    1.0
-}
-
-/// Where light comes from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub enum LightKindEntry {
-    /// Parallel light.
-    Directional {
-        /// Where the light travels.
-        direction: [f64; 3],
-    },
-    /// Light from a point.
-    Point {
-        /// Where it is.
-        position: [f64; 3],
-    },
-    /// A point light inside a cone.
-    Spot {
-        /// Where it is.
-        position: [f64; 3],
-        /// Where the cone points.
-        direction: [f64; 3],
-        /// Half angle of full light.
-        inner_deg: f64,
-        /// Half angle of no light.
-        outer_deg: f64,
-    },
-}
-
-/// A view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CameraEntry {
-    /// What the view is called.
-    pub name: String,
-    /// Where the eye is.
-    pub eye: [f64; 3],
-    /// What it looks at.
-    pub target: [f64; 3],
-    /// What is up in the picture.
-    #[serde(default = "up", skip_serializing_if = "is_up")]
-    pub up: [f64; 3],
-    /// How directions become pixels; left out, a perspective of 40 degrees.
-    #[serde(default)]
-    pub projection: ProjectionEntry,
-}
-
-fn up() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
-}
-fn is_up(value: &[f64; 3]) -> bool {
-    *value == up()
-}
-
-/// How directions become pixels; angles are whole angles.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub enum ProjectionEntry {
-    /// Straight lines stay straight.
-    Perspective {
-        /// Vertical field of view.
-        fov_y_deg: f64,
-    },
-    /// Parallel rays.
-    Orthographic {
-        /// Height of the picture.
-        height: f64,
-    },
-    /// Equidistant fisheye.
-    Fisheye {
-        /// Angle across the image circle.
-        fov_deg: f64,
-    },
-    /// Columns are angles around the up axis.
-    Cylindrical {
-        /// Angle across the width.
-        fov_x_deg: f64,
-        /// Vertical field of view at eye level.
-        fov_y_deg: f64,
-    },
-}
-
-impl Default for ProjectionEntry {
-    fn default() -> Self {
-        Self::Perspective { fov_y_deg: 40.0 }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Turns the shapes of scene files into those of the scene, and back.
 
 use super::place::usage;
-use super::schema::{HeightEntry, MeshEntry, ShapeEntry, VolumeEntry};
+use super::schema_shapes::{HeightEntry, MeshEntry, ShapeEntry, VolumeEntry};
 use crate::load::error::Fault;
 use crate::load::height;
 use crate::load::limits::{Limits, RawVolume, SampleFormat};

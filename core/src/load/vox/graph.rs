@@ -38,7 +38,7 @@ pub(super) fn flatten(chunks: &Chunks<'_>, most: u64, notes: &mut Notes) -> Resu
                 open.push((*child, world_from_parent * local(frame, notes), name_of(attributes).or(name)));
             }
             Node::Group { attributes, .. } if attributes.is_hidden() => {
-                notes.add("hidden nodes and layers are left out")
+                notes.add("hidden nodes and layers are left out");
             }
             Node::Group { attributes, children } => {
                 let name = name_of(attributes).or(name);
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn rotations_are_decoded_as_the_format_says() {
         // the example of the format's description: first row 0 1 0, second 0 0 -1, third -1 0 0
-        let code = 1 | 2 << 2 | 0 << 4 | 1 << 5 | 1 << 6;
+        let code = 1 | 2 << 2 | 1 << 5 | 1 << 6;
         let rotation = rotation_from_text(code.to_string().as_bytes()).unwrap();
         assert_eq!(rotation * DVec3::new(1.0, 2.0, 3.0), DVec3::new(2.0, -3.0, -1.0));
         assert_eq!(rotation_from_text(b"4"), Some(DMat3::IDENTITY));

@@ -1,10 +1,11 @@
 //! Turns the statements of an OBJ file into meshes: one vertex for each combination of indices, polygons cut into
 //! triangles.
 
-use super::notes::Notes;
-use super::obj::{Face, NONE, ObjPart, Statements};
-use super::polygon::PolygonCutter;
-use super::surface::RawMesh;
+use super::read::ObjPart;
+use super::statements::{Face, NONE, Statements};
+use crate::load::notes::Notes;
+use crate::load::polygon::PolygonCutter;
+use crate::load::surface::RawMesh;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 

@@ -1,17 +1,21 @@
-//! Makes a scene of an OBJ file with its material libraries and textures.
+//! Makes a scene of a Wavefront OBJ file with its material libraries and textures.
+
+mod mtl;
+mod parts;
+mod read;
+mod statements;
 
 use super::error::{Fault, one_line};
 use super::image::TextureMaker;
-use super::mtl::{self, LibraryMaterial, TextureReference};
-use super::obj;
 use super::source::Source;
 use crate::scene::{Material, Object, Scene, Shape};
+use mtl::{LibraryMaterial, TextureReference};
 use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Loads an OBJ file.
-pub(super) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
-    let file = obj::read(&source.bytes, source.limits, &mut source.notes)?;
+pub(in crate::load) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
+    let file = read::read(&source.bytes, source.limits, &mut source.notes)?;
     source.bytes = Vec::new();
     let mut materials = MaterialTable::default();
     for library in &file.libraries {

@@ -4,30 +4,30 @@
 //! mean, since highlights are white here; `Ka` is passed over (ambient light is relative to the base color), and so is
 //! every map but `map_Kd`.
 
-use super::error::{Fault, one_line};
-use super::notes::Notes;
-use super::text::{Words, decode_text, parse_number};
+use crate::load::error::{Fault, one_line};
+use crate::load::notes::Notes;
+use crate::load::text::{Words, decode_text, parse_number};
 use crate::scene::{AlphaMode, Material, TextureWrap};
 use glam::Vec3;
 use std::collections::BTreeSet;
 
 /// A material of a library; its texture is still a reference.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct LibraryMaterial {
-    pub(crate) name: String,
-    pub(crate) material: Material,
-    pub(crate) texture: Option<TextureReference>,
+pub(super) struct LibraryMaterial {
+    pub(super) name: String,
+    pub(super) material: Material,
+    pub(super) texture: Option<TextureReference>,
 }
 
 /// A reference to a picture.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct TextureReference {
-    pub(crate) file: String,
-    pub(crate) wrap: [TextureWrap; 2],
+pub(super) struct TextureReference {
+    pub(super) file: String,
+    pub(super) wrap: [TextureWrap; 2],
 }
 
 /// Reads a library; statements that are not understood are passed over, numbers that are none keep the default.
-pub(crate) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<LibraryMaterial>, Fault> {
+pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<LibraryMaterial>, Fault> {
     let mut words = Words::new(bytes)?;
     let mut list: Vec<LibraryMaterial> = Vec::new();
     let mut unused = BTreeSet::new();
