@@ -1,1 +1,48 @@
-//! The raster back end.
+//! A z-buffer rasterizer with shadow maps.
+//!
+//! A frame runs down one page of steps; each has a file of that name:
+//!
+//! ```text
+//!  model      meshes at their places, given or converted            (prepare)
+//!  shadow     what each light sees, drawn by the steps below        (prepare, when lights or things moved)
+//!  lens       camera -> rows that take points to pixels, and rays back
+//!  transform  every vertex once -> column, row, depth
+//!  clip       what reaches behind the eye or beyond the guard band
+//!  setup      corners snapped to 24.8 bits, exact edges, depth plane
+//!  bin        records sorted into tiles of 64x32 pixels
+//!  tile       spans of covered pixels; nearest triangle of each: the visibility buffer
+//!  layers     fragments of see-through triangles, sorted per pixel
+//!  resolve    ray meets the triangle's plane: distance, normals, texture with its mip level
+//!  light      the lighting equation of the core, with shadows
+//!  paint      the steps of a tile, and the pixel's channels
+//!  faces      cameras that bend straight lines: faces of a cube, looked up
+//! ```
+//!
+//! **Accuracy.** Coverage is exact on corners snapped to 1/256 pixel: a pixel on a shared edge belongs to one
+//! triangle. Distances come from the triangle's plane in double precision (1e-6 relative against closed forms).
+//! Of equal depths (`1/w`, rounded to `f32`) the lower triangle of the lower object wins, so pictures do not
+//! depend on the order of drawing. Shadow edges are exact where triangles are larger than a texel of the map.
+//!
+//! **Color** is that of the pixel's center whatever number of samples is asked for, and coverage is 0 or 1.
+
+mod bin;
+mod clip;
+mod decide;
+mod faces;
+mod info;
+mod layers;
+mod lens;
+mod light;
+mod model;
+mod paint;
+mod plan;
+mod renderer;
+mod resolve;
+mod setup;
+mod shadow;
+#[cfg(test)]
+mod tests;
+mod tile;
+mod transform;
+
+pub use renderer::{Factory, Raster};

@@ -1,0 +1,122 @@
+//! How is each object drawn, and what is lost?
+
+use crate::info::Options;
+use crate::light::Lamp;
+use crate::shadow::MapSizes;
+use polyptych_core::camera::Projection;
+use polyptych_core::convert::Detail;
+use polyptych_core::scene::{LightKind, Material, Mesh, Object, Scene, Shape};
+use polyptych_core::seam::{Decision, Need};
+
+/// Most cells along an edge that a free form is converted on.
+const FINEST: u32 = 256;
+
+/// What every object loses by the way the picture is drawn.
+pub(crate) const RESAMPLED: &str = "resampled from perspective faces";
+
+/// How fine an object is to be converted.
+pub(crate) fn detail(object: &Object, need: &Need) -> Detail {
+    Detail { tolerance: need.world_tolerance(&object.bounds()), max_resolution: FINEST }
+}
+
+/// Says why an object is not drawn, if that is so.
+pub(crate) fn why_skipped(object: &Object) -> Option<String> {
+    if !object.visible {
+        return Some("it is invisible".to_owned());
+    }
+    if let Shape::Mesh(mesh) = &*object.shape
+        && let Err(wrong) = mesh.check()
+    {
+        return Some(wrong);
+    }
+    if let Some(why) = object.why_undrawable() {
+        return Some(why.to_owned());
+    }
+    match &*object.shape {
+        Shape::Mesh(mesh) if mesh.triangles.is_empty() => Some("line segments have no area".to_owned()),
+        _ => None,
+    }
+}
+
+/// Says what is lost of an object itself.
+pub(crate) fn losses(scene: &Scene, object: &Object) -> Vec<String> {
+    let mut losses = Vec::new();
+    if let Shape::Mesh(mesh) = &*object.shape {
+        losses.extend(mesh_losses(mesh));
+    }
+    let materials = || (0..object.materials.len().max(1)).map(|slot| scene.material(object, slot));
+    if matches!(*object.shape, Shape::Voxels(_)) && materials().any(Material::is_see_through) {
+        losses.push("see-through voxels are drawn as their outer faces".to_owned());
+    }
+    if materials().any(|m| m.reflectivity > 0.0) {
+        losses.push("reflections are not drawn".to_owned());
+    }
+    losses
+}
+
+fn mesh_losses(mesh: &Mesh) -> Vec<String> {
+    let mut losses = Vec::new();
+    if !mesh.segments.is_empty() {
+        losses.push(format!("{} line segments are left out: they have no area", mesh.segments.len()));
+    }
+    let broken =
+        (0..mesh.triangles.len()).filter(|&t| !mesh.corners(t).iter().all(|c| c.is_finite())).count();
+    if broken > 0 {
+        losses.push(format!("{broken} triangles with corners that are not finite are left out"));
+    }
+    losses
+}
+
+/// Says what every object loses of its light.
+pub(crate) fn light_losses(lamps: &[Lamp], options: Options, sizes: MapSizes) -> Option<&'static str> {
+    let casting = |lamp: &&Lamp| lamp.light.casts_shadow;
+    if !options.shadow {
+        return lamps.iter().find(casting).map(|_| "shadows are switched off");
+    }
+    let local = lamps.iter().filter(casting).any(|l| !matches!(l.light.kind, LightKind::Directional { .. }));
+    (local && sizes.local.is_none())
+        .then_some("shadows of point and spot lights are not drawn: too many lights")
+}
+
+/// Decides about an object that is drawn; `converted` are bound and description of its triangles.
+pub(crate) fn decision(
+    object: &Object,
+    converted: Option<(f64, String)>,
+    mut losses: Vec<String>,
+) -> Decision {
+    let exact_faces = matches!(*object.shape, Shape::Primitive(_) | Shape::Voxels(_));
+    let converted = match (converted, &*object.shape) {
+        (Some((_, why)), Shape::Volume(_)) => {
+            losses.insert(0, why);
+            None
+        }
+        (Some((bound, _)), _) if exact_faces && bound <= 0.0 => None,
+        (converted, _) => converted,
+    };
+    match (losses.is_empty(), converted) {
+        (true, None) => Decision::Exact,
+        (true, Some((bound, why))) => Decision::Converted { bound, why },
+        (false, None) => Decision::Approximated { why: losses.join("; ") },
+        (false, Some((bound, why))) => {
+            losses.push(format!("{why}, at most {bound:.2e} m off"));
+            Decision::Approximated { why: losses.join("; ") }
+        }
+    }
+}
+
+/// Adds a loss to a decision.
+pub(crate) fn with_loss(decision: &Decision, loss: &str) -> Decision {
+    match decision {
+        Decision::Skipped { .. } => decision.clone(),
+        Decision::Exact => Decision::Approximated { why: loss.to_owned() },
+        Decision::Approximated { why } => Decision::Approximated { why: format!("{why}; {loss}") },
+        Decision::Converted { bound, why } => {
+            Decision::Approximated { why: format!("{loss}; {why}, at most {bound:.2e} m off") }
+        }
+    }
+}
+
+/// Tells whether a camera's picture is put together from faces.
+pub(crate) fn is_resampled(projection: &Projection) -> bool {
+    !matches!(projection, Projection::Perspective { .. } | Projection::Orthographic { .. })
+}

@@ -1,0 +1,63 @@
+//! What lies before the nearest solid surface of each pixel: fragments that light may pass, front to back.
+//!
+//! All fragments of a tile are kept and sorted, so any number of layers is right whatever the order of triangles.
+
+use crate::setup::Record;
+use crate::tile::{TILE_WIDTH, TileArea, TileBuffer, for_each_span};
+
+/// A triangle on a pixel. The order of the fields is the order of drawing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Fragment {
+    /// Pixel within the tile.
+    pixel: u32,
+    /// Falls with depth: nearer fragments come first.
+    far: u32,
+    pub(crate) id: u32,
+}
+
+/// Collects the fragments of a triangle that the solid surfaces of the tile do not hide.
+pub(crate) fn collect(fragments: &mut Vec<Fragment>, record: &Record, area: &TileArea, solid: &TileBuffer) {
+    for_each_span(record, area, |span| {
+        let start = record.depth_at(span.x, span.y);
+        for i in 0..span.length {
+            let depth = record.hold(start + record.plane.by_column * i as f64);
+            let pixel = span.first + i;
+            let hidden =
+                depth < solid.depth[pixel] || (depth == solid.depth[pixel] && record.id > solid.id[pixel]);
+            if !hidden {
+                fragments.push(Fragment { pixel: pixel as u32, far: !ordered(depth), id: record.id });
+            }
+        }
+    });
+}
+
+/// Sorts fragments by pixel, then from front to back, then by id.
+pub(crate) fn sort(fragments: &mut [Fragment]) {
+    fragments.sort_unstable();
+}
+
+/// Takes the fragments of the next pixel off the front of a sorted list.
+pub(crate) fn take_pixel<'a>(fragments: &mut &'a [Fragment], x: u32, row: u32) -> &'a [Fragment] {
+    let pixel = row * TILE_WIDTH + x;
+    let count = fragments.iter().take_while(|f| f.pixel == pixel).count();
+    let (of_pixel, rest) = fragments.split_at(count);
+    *fragments = rest;
+    of_pixel
+}
+
+/// Maps numbers to whole numbers in the same order.
+fn ordered(v: f32) -> u32 {
+    let bits = v.to_bits();
+    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_keep_the_order_of_depths() {
+        let depths = [f32::NEG_INFINITY, -2.5, -1e-20, 0.0, 1e-20, 3.0, f32::INFINITY];
+        assert!(depths.windows(2).all(|d| ordered(d[0]) < ordered(d[1])));
+    }
+}

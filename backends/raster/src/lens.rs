@@ -1,0 +1,262 @@
+//! On which pixel does a point fall, and which ray goes through a place of the picture?
+
+use glam::{DAffine3, DMat3, DVec3};
+use polyptych_core::camera::{Camera, Projection};
+
+/// Pixels around the picture up to which triangles are drawn unclipped. Coordinates there fit 24.8 bits for
+/// pictures of any sensible size.
+pub(crate) const GUARD: f64 = 8192.0;
+
+/// A straight-line view: a picture plane with square or oblong pixels, seen from an eye or along parallel rays.
+///
+/// Points and rays are given relative to [`Lens::origin`], so that large world coordinates cost no digits.
+#[derive(Clone, Debug)]
+pub(crate) struct Lens {
+    /// The eye; for parallel rays the middle of the picture plane.
+    pub(crate) origin: DVec3,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    /// What is less far ahead is not drawn.
+    pub(crate) near: f64,
+    pub(crate) rays: Rays,
+    column: Row,
+    row: Row,
+    ahead: Row,
+    start: Linear,
+    direction: Linear,
+}
+
+/// How the rays of a view run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rays {
+    /// From the eye: the picture is divided by the distance ahead.
+    Central,
+    /// Along the view.
+    Parallel,
+}
+
+/// An affine function of a point.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    slope: DVec3,
+    offset: f64,
+}
+
+/// An affine function of a place in the picture, in pixels.
+#[derive(Clone, Copy, Debug)]
+struct Linear {
+    base: DVec3,
+    by_column: DVec3,
+    by_row: DVec3,
+}
+
+/// A point before division: column and row times `w`, and the distance ahead. `w` is the distance ahead for
+/// central rays and 1 for parallel ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Homogeneous {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) ahead: f64,
+}
+
+/// A lens applied to points of an object.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScreenFromObject {
+    column: Row,
+    row: Row,
+    ahead: Row,
+}
+
+/// A ray through the picture, relative to the lens's origin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PixelRay {
+    pub(crate) start: DVec3,
+    /// Not of unit length.
+    pub(crate) direction: DVec3,
+    /// Unit length.
+    pub(crate) unit: DVec3,
+    pub(crate) length: f64,
+}
+
+impl Row {
+    fn at(&self, p: DVec3) -> f64 {
+        self.slope.dot(p) + self.offset
+    }
+
+    /// Applies the function to points that an affine map places first.
+    fn after(&self, map: &DAffine3, origin: DVec3) -> Self {
+        Self {
+            slope: map.matrix3.transpose() * self.slope,
+            offset: self.slope.dot(map.translation - origin) + self.offset,
+        }
+    }
+}
+
+impl Linear {
+    fn at(&self, x: f64, y: f64) -> DVec3 {
+        self.base + self.by_column * x + self.by_row * y
+    }
+}
+
+impl Lens {
+    /// Builds a view from an eye. `axes` are right, up and backward; `scale` is in pixels for a slope of 1.
+    pub(crate) fn central(origin: DVec3, axes: DMat3, scale: f64, size: [u32; 2], near: f64) -> Self {
+        let (inverse, half) = (axes.inverse().transpose(), size.map(|s| f64::from(s) * 0.5));
+        let forward = -inverse.z_axis;
+        let (by_column, by_row) = (axes.x_axis / scale, -axes.y_axis / scale);
+        Self {
+            origin,
+            width: size[0],
+            height: size[1],
+            near,
+            rays: Rays::Central,
+            column: Row { slope: inverse.x_axis * scale + forward * half[0], offset: 0.0 },
+            row: Row { slope: forward * half[1] - inverse.y_axis * scale, offset: 0.0 },
+            ahead: Row { slope: forward, offset: 0.0 },
+            start: Linear { base: DVec3::ZERO, by_column: DVec3::ZERO, by_row: DVec3::ZERO },
+            direction: Linear {
+                base: -axes.z_axis - by_column * half[0] - by_row * half[1],
+                by_column,
+                by_row,
+            },
+        }
+    }
+
+    /// Builds a view along parallel rays; `scale` is in pixels a meter along both axes of the picture.
+    pub(crate) fn parallel(origin: DVec3, axes: DMat3, scale: [f64; 2], size: [u32; 2]) -> Self {
+        let (inverse, half) = (axes.inverse().transpose(), size.map(|s| f64::from(s) * 0.5));
+        let (by_column, by_row) = (axes.x_axis / scale[0], -axes.y_axis / scale[1]);
+        Self {
+            origin,
+            width: size[0],
+            height: size[1],
+            near: 0.0,
+            rays: Rays::Parallel,
+            column: Row { slope: inverse.x_axis * scale[0], offset: half[0] },
+            row: Row { slope: inverse.y_axis * -scale[1], offset: half[1] },
+            ahead: Row { slope: -inverse.z_axis, offset: 0.0 },
+            start: Linear { base: -by_column * half[0] - by_row * half[1], by_column, by_row },
+            direction: Linear { base: -axes.z_axis, by_column: DVec3::ZERO, by_row: DVec3::ZERO },
+        }
+    }
+
+    /// Builds the view of a camera; nothing for cameras that bend straight lines.
+    pub(crate) fn of_camera(camera: &Camera, width: u32, height: u32, near: f64) -> Option<Self> {
+        let tall = f64::from(height.max(1));
+        match camera.projection {
+            Projection::Perspective { fov_y } => {
+                let scale = tall / (2.0 * (fov_y * 0.5).tan());
+                Some(Self::central(camera.eye, camera.world_from_camera, scale, [width, height], near))
+            }
+            Projection::Orthographic { height: meters } => {
+                let scale = [tall / meters; 2];
+                Some(Self::parallel(camera.eye, camera.world_from_camera, scale, [width, height]))
+            }
+            Projection::Fisheye { .. } | Projection::Cylindrical { .. } | Projection::Warp(_) => None,
+        }
+    }
+
+    /// Returns the lens for points of an object.
+    pub(crate) fn for_object(&self, world_from_object: &DAffine3) -> ScreenFromObject {
+        let of = |row: &Row| row.after(world_from_object, self.origin);
+        ScreenFromObject { column: of(&self.column), row: of(&self.row), ahead: of(&self.ahead) }
+    }
+
+    /// Returns column, row and distance ahead of a point relative to the origin.
+    pub(crate) fn place(&self, p: DVec3) -> (f64, f64, f64) {
+        let ahead = self.ahead.at(p);
+        let share = match self.rays {
+            Rays::Central => 1.0 / ahead,
+            Rays::Parallel => 1.0,
+        };
+        (self.column.at(p) * share, self.row.at(p) * share, ahead)
+    }
+
+    /// Returns the ray through a place of the picture.
+    pub(crate) fn ray(&self, x: f64, y: f64) -> PixelRay {
+        let direction = self.direction.at(x, y);
+        let length = direction.length();
+        PixelRay { start: self.start.at(x, y), direction, unit: direction / length, length }
+    }
+
+    /// Returns how the point at `t` along a ray moves over one pixel to the right and one down, before it is put
+    /// back onto a surface.
+    pub(crate) fn change(&self, t: f64) -> (DVec3, DVec3) {
+        (self.start.by_column + self.direction.by_column * t, self.start.by_row + self.direction.by_row * t)
+    }
+
+    /// Returns the divisor of a point's column and row.
+    pub(crate) fn divisor(&self, ahead: f64) -> f64 {
+        match self.rays {
+            Rays::Central => ahead,
+            Rays::Parallel => 1.0,
+        }
+    }
+
+    /// Returns the depth that is compared: larger is nearer, and it is linear over the picture. `1/w` keeps the
+    /// same number of digits at every distance, so there is no far plane.
+    pub(crate) fn depth(&self, ahead: f64) -> f64 {
+        match self.rays {
+            Rays::Central => 1.0 / ahead,
+            Rays::Parallel => -ahead,
+        }
+    }
+}
+
+impl ScreenFromObject {
+    pub(crate) fn apply(&self, p: DVec3) -> Homogeneous {
+        Homogeneous { x: self.column.at(p), y: self.row.at(p), ahead: self.ahead.at(p) }
+    }
+}
+
+/// Returns right, up and backward of the faces of a cube: +x -x +y -y +z -z.
+pub(crate) fn cube_axes(face: usize) -> DMat3 {
+    let forward = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z][face];
+    let up = if forward.y == 0.0 { DVec3::Y } else { DVec3::Z };
+    DMat3::from_cols(up.cross(-forward), up, -forward)
+}
+
+/// Returns the face of [`cube_axes`] that a direction goes through.
+pub(crate) fn cube_face(d: DVec3) -> usize {
+    let a = d.abs();
+    let (axis, negative) = if a.x >= a.y && a.x >= a.z {
+        (0, d.x < 0.0)
+    } else if a.y >= a.z {
+        (1, d.y < 0.0)
+    } else {
+        (2, d.z < 0.0)
+    };
+    axis * 2 + usize::from(negative)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_go_through_the_pixels_where_their_points_fall() {
+        let camera = |projection: Projection| {
+            Camera::look_at(DVec3::new(3.0, 2.0, 5.0), DVec3::new(0.0, 0.5, 0.0), DVec3::Y, projection)
+        };
+        for projection in [Projection::Perspective { fov_y: 0.8 }, Projection::Orthographic { height: 4.0 }] {
+            let camera = camera(projection);
+            let lens = Lens::of_camera(&camera, 64, 36, 1e-6).unwrap();
+            for (x, y) in [(0.5, 0.5), (32.0, 18.0), (63.5, 7.25)] {
+                let (ray, truth) = (lens.ray(x, y), camera.view(64, 36).ray(x, y).unwrap());
+                assert!((ray.unit - truth.direction).length() < 1e-14);
+                assert!((ray.start + lens.origin - truth.origin).length() < 1e-14);
+                let (column, row, ahead) = lens.place(ray.start + ray.direction * 2.5);
+                assert!((column - x).abs() < 1e-12 && (row - y).abs() < 1e-12 && ahead > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn faces_of_the_cube_look_where_they_are_chosen() {
+        for face in 0..6 {
+            let axes = cube_axes(face);
+            assert_eq!(cube_face(-axes.z_axis), face);
+            assert!((axes.determinant() - 1.0).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! What is drawn: triangle meshes at their places, given or converted.
+
+use crate::setup::Sides;
+use glam::{DAffine3, DMat3, DVec3};
+use polyptych_core::convert::MeshModel;
+use polyptych_core::math::Aabb;
+use polyptych_core::scene::{AlphaMode, Material, Mesh, Object, Scene, Shape};
+use std::sync::Arc;
+
+/// All triangles of a scene, numbered through.
+pub(crate) struct Model {
+    /// By rising index of their objects.
+    pub(crate) parts: Vec<Part>,
+    pub(crate) triangles: u32,
+    pub(crate) vertices: usize,
+    pub(crate) bounds: Aabb,
+    /// Largest coordinate that went into a corner: what rounding errors are measured by.
+    pub(crate) reach: f64,
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Self { parts: Vec::new(), triangles: 0, vertices: 0, bounds: Aabb::EMPTY, reach: 0.0 }
+    }
+}
+
+/// An object as triangles.
+pub(crate) struct Part {
+    /// Index in the scene.
+    pub(crate) object: usize,
+    pub(crate) source: Source,
+    pub(crate) world_from_object: DAffine3,
+    /// Turns normals of object space into such of world space.
+    pub(crate) world_from_normal: DMat3,
+    /// Whether the transform turns the winding over.
+    pub(crate) mirrored: bool,
+    pub(crate) first_triangle: u32,
+    pub(crate) first_vertex: usize,
+    /// How each slot looks to the camera and to lights.
+    classes: Vec<[Class; 2]>,
+    /// Whether light can be blocked on its way to it.
+    pub(crate) takes_shadow: bool,
+    /// Whether faces that let light through are seen from outside only: one step into a solid is one surface.
+    pub(crate) one_sided_layers: bool,
+}
+
+/// Where the triangles of a part come from.
+#[derive(Clone)]
+pub(crate) enum Source {
+    /// The scene.
+    Given(Arc<Shape>),
+    /// The converter.
+    Converted(Arc<MeshModel>),
+}
+
+/// For whom a pass is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// The camera: everything that can be seen.
+    Camera,
+    /// A light: everything that blocks it.
+    Light,
+}
+
+/// How a triangle takes part in a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Class {
+    /// Not at all.
+    Nothing,
+    /// It hides what lies behind.
+    Solid,
+    /// It may have holes or let light through.
+    Layer,
+}
+
+impl Source {
+    pub(crate) fn mesh(&self) -> &Mesh {
+        static NOTHING: Mesh = Mesh {
+            positions: Vec::new(),
+            normals: Vec::new(),
+            uvs: Vec::new(),
+            colors: Vec::new(),
+            triangles: Vec::new(),
+            slots: Vec::new(),
+            segments: Vec::new(),
+        };
+        match self {
+            Self::Converted(model) => &model.mesh,
+            Self::Given(shape) => match &**shape {
+                Shape::Mesh(mesh) => mesh,
+                _ => &NOTHING,
+            },
+        }
+    }
+
+    /// Tells whether both are the same triangles in memory.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Given(a), Self::Given(b)) => Arc::ptr_eq(a, b),
+            (Self::Converted(a), Self::Converted(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+}
+
+impl Model {
+    /// Adds an object; false when its triangles cannot be numbered any more.
+    pub(crate) fn add(&mut self, scene: &Scene, index: usize, source: Source) -> bool {
+        let object = &scene.objects[index];
+        let mesh = source.mesh();
+        let Ok(count) = u32::try_from(mesh.triangles.len()) else { return false };
+        let Some(triangles) = self.triangles.checked_add(count).filter(|&t| t < u32::MAX) else {
+            return false;
+        };
+        let vertices = mesh.positions.len();
+        let own_bounds = mesh.bounds();
+        let bounds = own_bounds.transformed(&object.world_from_object);
+        let matrix = object.world_from_object.matrix3;
+        let scale = matrix.x_axis.length().max(matrix.y_axis.length()).max(matrix.z_axis.length());
+        if !own_bounds.is_empty() {
+            let farthest = own_bounds.min.abs().max(own_bounds.max.abs()).max_element();
+            self.reach = self.reach.max(farthest * scale);
+            self.bounds = self.bounds.union(bounds);
+        }
+        self.parts.push(Part {
+            object: index,
+            world_from_object: object.world_from_object,
+            world_from_normal: matrix.inverse().transpose(),
+            mirrored: matrix.determinant() < 0.0,
+            first_triangle: self.triangles,
+            first_vertex: self.vertices,
+            classes: classes(scene, object),
+            takes_shadow: !matches!(*object.shape, Shape::Volume(_)),
+            one_sided_layers: matches!(*object.shape, Shape::Voxels(_)),
+            source,
+        });
+        self.triangles = triangles;
+        self.vertices += vertices;
+        true
+    }
+
+    /// Returns the part of a triangle, and the triangle's index in it.
+    pub(crate) fn find(&self, id: u32) -> (usize, usize) {
+        let part = self.parts.partition_point(|p| p.first_triangle <= id).saturating_sub(1);
+        (part, (id - self.parts[part].first_triangle) as usize)
+    }
+}
+
+impl Part {
+    pub(crate) fn mesh(&self) -> &Mesh {
+        self.source.mesh()
+    }
+
+    /// Returns how a slot takes part in a pass.
+    pub(crate) fn class(&self, role: Role, slot: usize) -> Class {
+        self.classes.get(slot).unwrap_or(&self.classes[0])[role as usize]
+    }
+
+    /// Returns the sides to draw when those that look away are to be left out.
+    pub(crate) fn sides(&self, culls: bool) -> Sides {
+        match (culls, self.mirrored) {
+            (false, _) => Sides::Both,
+            (true, false) => Sides::CounterClockwise,
+            (true, true) => Sides::Clockwise,
+        }
+    }
+
+    /// Returns the corners of a triangle in world space, relative to an origin.
+    pub(crate) fn corners(&self, triangle: usize, origin: DVec3) -> [DVec3; 3] {
+        let offset = self.world_from_object.translation - origin;
+        self.mesh().corners(triangle).map(|p| self.world_from_object.matrix3 * p.as_dvec3() + offset)
+    }
+
+    /// Tells whether two parts throw the same shadows.
+    pub(crate) fn blocks_like(&self, other: &Self) -> bool {
+        self.source.is(&other.source)
+            && self.world_from_object == other.world_from_object
+            && self.first_triangle == other.first_triangle
+            && self.classes == other.classes
+    }
+}
+
+fn classes(scene: &Scene, object: &Object) -> Vec<[Class; 2]> {
+    let is_volume = matches!(*object.shape, Shape::Volume(_));
+    (0..object.materials.len().max(1))
+        .map(|slot| {
+            let material = scene.material(object, slot);
+            let to_light = if is_volume { Class::Nothing } else { class_to_light(material) };
+            [class_to_camera(material), to_light]
+        })
+        .collect()
+}
+
+fn class_to_camera(material: &Material) -> Class {
+    if !material.is_see_through() {
+        Class::Solid
+    } else if material.alpha == AlphaMode::Opaque && material.opacity <= 0.0 {
+        Class::Nothing
+    } else {
+        Class::Layer
+    }
+}
+
+fn class_to_light(material: &Material) -> Class {
+    match material.alpha {
+        AlphaMode::Opaque if material.opacity >= 1.0 => Class::Solid,
+        AlphaMode::Mask(_) if material.opacity >= 1.0 => Class::Layer,
+        AlphaMode::Opaque | AlphaMode::Mask(_) | AlphaMode::Blend => Class::Nothing,
+    }
+}

@@ -1,0 +1,416 @@
+//! How does the host drive the rasterizer: plan, prepare, render?
+
+use crate::bin::{Bins, Pass};
+use crate::decide::{self, RESAMPLED, is_resampled};
+use crate::faces::{Faces, face_lens, needed};
+use crate::info::{Options, info};
+use crate::layers::Fragment;
+use crate::lens::Lens;
+use crate::light::{Illumination, Lamp};
+use crate::model::{Model, Role, Source};
+use crate::paint::{Announce, Painter};
+use crate::plan::plan;
+use crate::shadow::{MapSizes, Shadows};
+use crate::tile::TileGrid;
+use crate::transform::{ScreenVertex, transform};
+use polyptych_core::camera::Camera;
+use polyptych_core::convert::{Converter, Detail, MeshModel};
+use polyptych_core::framebuffer::{Channel, Framebuffer};
+use polyptych_core::scene::{Light, Material, Object, Scene, Shape};
+use polyptych_core::seam::{
+    BackendFactory, BackendInfo, Cancelled, Control, Counter, Decision, Frame, Need, Phases, Plan, Prepared,
+    Registry, RenderError, Renderer, Report,
+};
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// Largest width and height: beyond, snapped corners would not fit their numbers.
+const LARGEST: u32 = 4_000_000;
+/// What is nearer to the eye than this share of the scene's size and distance is not drawn.
+const NEAR: f64 = 1e-6;
+
+/// Makes instances of [`Raster`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Factory;
+
+impl BackendFactory for Factory {
+    fn info(&self) -> BackendInfo {
+        info()
+    }
+
+    fn create(&self, _registry: &Registry) -> Box<dyn Renderer> {
+        Box::new(Raster::new())
+    }
+}
+
+/// The rasterizer. See the crate's documentation for what it draws and how.
+pub struct Raster {
+    info: BackendInfo,
+    ready: Option<Ready>,
+    /// Conversions that the last `prepare` used.
+    converted: Vec<Conversion>,
+    scratch: Scratch,
+}
+
+/// A prepared scene.
+struct Ready {
+    scene: Arc<Scene>,
+    model: Model,
+    lamps: Vec<Lamp>,
+    shadows: Option<Arc<Shadows>>,
+    sizes: MapSizes,
+    options: Options,
+    decisions: Arc<[Decision]>,
+    /// The same for cameras that bend straight lines.
+    decisions_resampled: Arc<[Decision]>,
+    as_drawn: OnceLock<Option<Arc<Scene>>>,
+}
+
+/// Buffers that live from frame to frame.
+#[derive(Default)]
+struct Scratch {
+    vertices: Vec<ScreenVertex>,
+    bins: Bins,
+    layers: Vec<Mutex<Vec<Fragment>>>,
+    faces: Faces,
+}
+
+/// A converted shape with all that it was made from.
+struct Conversion {
+    shape: Arc<Shape>,
+    matrix: glam::DMat3,
+    materials: Vec<Material>,
+    /// Half octaves of tolerance, the converter's own classes.
+    class: i32,
+    model: Arc<MeshModel>,
+}
+
+impl Default for Raster {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Raster {
+    /// Makes an instance that has nothing prepared.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { info: info(), ready: None, converted: Vec::new(), scratch: Scratch::default() }
+    }
+
+    /// Decides about all objects and converts what must be.
+    fn build_model(
+        &mut self,
+        scene: &Scene,
+        need: &Need,
+        converter: &Converter,
+        control: &Control<'_>,
+    ) -> Result<(Model, Vec<Decision>), RenderError> {
+        let (mut model, mut decisions) = (Model::default(), Vec::with_capacity(scene.objects.len()));
+        let mut used = Vec::new();
+        for (index, object) in scene.objects.iter().enumerate() {
+            control.check()?;
+            if let Some(why) = decide::why_skipped(object) {
+                if object.required && object.visible {
+                    return Err(RenderError::Required { object: object.name.clone(), reason: why });
+                }
+                decisions.push(Decision::Skipped { why });
+                continue;
+            }
+            let (source, converted) = if let Shape::Mesh(_) = &*object.shape {
+                (Source::Given(object.shape.clone()), None)
+            } else {
+                let conversion = self.convert(scene, object, need, converter, control)?;
+                let mesh = conversion.model.clone();
+                used.push(conversion);
+                (Source::Converted(mesh.clone()), Some((mesh.bound, mesh.why.clone())))
+            };
+            if !model.add(scene, index, source) {
+                return Err(RenderError::Failed(format!("more than {} triangles", u32::MAX)));
+            }
+            decisions.push(decide::decision(object, converted, decide::losses(scene, object)));
+        }
+        self.converted = used;
+        Ok((model, decisions))
+    }
+
+    /// Finds what an earlier call converted, or asks the converter.
+    fn convert(
+        &self,
+        scene: &Scene,
+        object: &Object,
+        need: &Need,
+        converter: &Converter,
+        control: &Control<'_>,
+    ) -> Result<Conversion, RenderError> {
+        let detail = decide::detail(object, need);
+        let wanted = |c: &&Conversion| c.serves(scene, object, detail);
+        let model = match self.converted.iter().find(wanted) {
+            Some(kept) => kept.model.clone(),
+            None => converter
+                .mesh(scene, object, detail, control.threads)
+                .map_err(|e| RenderError::Failed(e.to_string()))?,
+        };
+        Ok(Conversion {
+            shape: object.shape.clone(),
+            matrix: object.world_from_object.matrix3,
+            materials: materials(scene, object),
+            class: class(detail),
+            model,
+        })
+    }
+}
+
+impl Conversion {
+    fn serves(&self, scene: &Scene, object: &Object, detail: Detail) -> bool {
+        Arc::ptr_eq(&self.shape, &object.shape)
+            && self.class == class(detail)
+            && self.matrix == object.world_from_object.matrix3
+            && self.materials == materials(scene, object)
+    }
+}
+
+fn class(detail: Detail) -> i32 {
+    (detail.tolerance.log2() * 2.0 + 1e-9).floor() as i32
+}
+
+fn materials(scene: &Scene, object: &Object) -> Vec<Material> {
+    (0..object.materials.len()).map(|slot| scene.material(object, slot).clone()).collect()
+}
+
+impl Renderer for Raster {
+    fn info(&self) -> &BackendInfo {
+        &self.info
+    }
+
+    fn plan(&self, scene: &Scene, need: &Need) -> Plan {
+        plan(scene, need, Options::of(need, &self.info))
+    }
+
+    fn prepare(
+        &mut self,
+        scene: &Arc<Scene>,
+        need: &Need,
+        converter: &Converter,
+        control: &Control<'_>,
+    ) -> Result<Prepared, RenderError> {
+        let before = self.ready.take();
+        let options = Options::of(need, &self.info);
+        let (model, mut decisions) = self.build_model(scene, need, converter, control)?;
+        let lamps = Lamp::all(scene);
+        let sizes = MapSizes::new(options.map_size, &lamps);
+        if let Some(loss) = decide::light_losses(&lamps, options, sizes) {
+            decisions.iter_mut().for_each(|d| *d = decide::with_loss(d, loss));
+        }
+        let casts = lamps.iter().any(|l| l.light.casts_shadow);
+        let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
+        let mut ready = Ready {
+            scene: scene.clone(),
+            model,
+            lamps,
+            shadows: None,
+            sizes,
+            options,
+            decisions_resampled: decisions.iter().map(|d| decide::with_loss(d, RESAMPLED)).collect(),
+            decisions: decisions.into(),
+            as_drawn: OnceLock::new(),
+        };
+        if options.shadow && casts && asked {
+            ready.shadows = Some(match before.and_then(|b| b.shadows_for(&ready)) {
+                Some(kept) => kept,
+                None => Arc::new(self.scratch.draw_shadows(&ready, control)?),
+            });
+        }
+        let prepared = Prepared { objects: ready.decisions(&need.camera), bytes: ready.bytes() };
+        self.ready = Some(ready);
+        Ok(prepared)
+    }
+
+    fn model(&self) -> Option<Arc<Scene>> {
+        let ready = self.ready.as_ref()?;
+        ready.as_drawn.get_or_init(|| ready.as_drawn()).clone()
+    }
+
+    fn render(
+        &mut self,
+        frame: &Frame,
+        target: &mut Framebuffer,
+        control: &Control<'_>,
+    ) -> Result<Report, RenderError> {
+        let ready = self.ready.as_ref().ok_or(RenderError::NotPrepared)?;
+        let (width, height) = (target.width(), target.height());
+        if width > LARGEST || height > LARGEST {
+            return Err(RenderError::Failed(format!("{width}x{height} is more than {LARGEST} pixels long")));
+        }
+        let mut work = Work { phases: Phases::start(), triangles: 0, shaded: 0 };
+        let near = ready.near(&frame.camera);
+        match Lens::of_camera(&frame.camera, width, height, near) {
+            Some(lens) => self.scratch.draw(ready, &lens, target, Announce::Yes, &mut work, control)?,
+            None => self.scratch.draw_bent(ready, &frame.camera, target, &mut work, control)?,
+        }
+        let mut counters = [None; 6];
+        counters[0] = Some(Counter { name: "triangles", count: work.triangles });
+        counters[1] = Some(Counter { name: "pixels shaded", count: work.shaded });
+        Ok(Report {
+            objects: ready.decisions(&frame.camera),
+            phases: work.phases,
+            counters,
+            bytes: ready.bytes() + self.scratch.bytes(),
+        })
+    }
+}
+
+/// What a frame took.
+struct Work {
+    phases: Phases,
+    triangles: u64,
+    shaded: u64,
+}
+
+impl Scratch {
+    /// Draws a picture: vertices, bins, tiles.
+    fn draw(
+        &mut self,
+        ready: &Ready,
+        lens: &Lens,
+        target: &mut Framebuffer,
+        announce: Announce,
+        work: &mut Work,
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
+        draw(
+            ready,
+            lens,
+            target,
+            announce,
+            work,
+            control,
+            (&mut self.vertices, &mut self.bins, &mut self.layers),
+        )
+    }
+
+    /// Draws the faces of a cube and looks the picture up in them.
+    fn draw_bent(
+        &mut self,
+        ready: &Ready,
+        camera: &Camera,
+        target: &mut Framebuffer,
+        work: &mut Work,
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
+        let (width, height) = (target.width(), target.height());
+        let view = camera.view(width, height);
+        let edge = self.faces.reserve(&view, width, height, target.channels());
+        let needed = needed(camera, width, height, control.threads);
+        for face in (0..6).filter(|face| needed >> face & 1 == 1) {
+            let lens = face_lens(camera, face, edge, ready.near(camera));
+            let buffers = (&mut self.vertices, &mut self.bins, &mut self.layers);
+            let picture = self.faces.picture(face);
+            draw(ready, &lens, picture, Announce::No, work, control, buffers)?;
+        }
+        self.faces.resample(camera, &ready.scene.environment.background, target, control.threads);
+        control.finished(&target.band());
+        work.phases.end("resample");
+        Ok(())
+    }
+
+    fn draw_shadows(&mut self, ready: &Ready, control: &Control<'_>) -> Result<Shadows, Cancelled> {
+        let (vertices, bins) = (&mut self.vertices, &mut self.bins);
+        Shadows::build(&ready.scene, &ready.model, &ready.lamps, ready.sizes, vertices, bins, control)
+    }
+
+    fn bytes(&self) -> u64 {
+        let layers: usize = self
+            .layers
+            .iter()
+            .filter_map(|l| l.lock().ok())
+            .map(|l| l.capacity() * size_of::<Fragment>())
+            .sum();
+        (self.vertices.capacity() * size_of::<ScreenVertex>() + layers) as u64
+            + self.bins.bytes()
+            + self.faces.bytes()
+    }
+}
+
+type Buffers<'a> = (&'a mut Vec<ScreenVertex>, &'a mut Bins, &'a mut Vec<Mutex<Vec<Fragment>>>);
+
+/// The pipeline.
+fn draw(
+    ready: &Ready,
+    lens: &Lens,
+    target: &mut Framebuffer,
+    announce: Announce,
+    work: &mut Work,
+    control: &Control<'_>,
+    (vertices, bins, layers): Buffers<'_>,
+) -> Result<(), Cancelled> {
+    control.check()?;
+    let culls_back = ready.options.culls_back;
+    let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, without: None };
+    // 1. Where on the picture is every vertex?
+    transform(&ready.model, lens, vertices, control.threads);
+    work.phases.end("transform");
+    // 2. Clip, set up, and sort the triangles into tiles.
+    bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height), control.threads);
+    work.triangles += bins.triangles();
+    work.phases.end("bin");
+    // 3. Draw tile by tile: visibility, layers, surfaces and light.
+    let light = Illumination {
+        scene: &ready.scene,
+        model: &ready.model,
+        lamps: &ready.lamps,
+        shadows: ready.shadows.as_deref(),
+    };
+    let painter = Painter::new(light, lens, bins, target.channels());
+    work.shaded += painter.paint(target, layers, announce, control)?;
+    work.phases.end("draw");
+    Ok(())
+}
+
+impl Ready {
+    fn decisions(&self, camera: &Camera) -> Arc<[Decision]> {
+        let bent = is_resampled(&camera.projection);
+        if bent { self.decisions_resampled.clone() } else { self.decisions.clone() }
+    }
+
+    fn near(&self, camera: &Camera) -> f64 {
+        let bounds = &self.model.bounds;
+        let near = NEAR * (bounds.radius() + bounds.center().distance(camera.eye));
+        if near > 0.0 && near.is_finite() { near } else { NEAR }
+    }
+
+    fn bytes(&self) -> u64 {
+        let converted = |s: &Source| if let Source::Converted(m) = s { m.mesh.bytes() } else { 0 };
+        self.model.parts.iter().map(|p| converted(&p.source)).sum::<u64>()
+            + self.shadows.as_ref().map_or(0, |s| s.bytes())
+    }
+
+    /// Returns the shadow maps if they are those of another scene, too: same lights, same things that block.
+    fn shadows_for(self, other: &Self) -> Option<Arc<Shadows>> {
+        let lights = |r: &Self| r.lamps.iter().map(|l| l.light.clone()).collect::<Vec<Light>>();
+        let same_parts = self.model.parts.len() == other.model.parts.len()
+            && self.model.parts.iter().zip(&other.model.parts).all(|(a, b)| a.blocks_like(b));
+        let same_cells = self.lamps.iter().zip(&other.lamps).all(|(a, b)| a.cell == b.cell);
+        let has_masks =
+            other.scene.materials.iter().any(|m| m.alpha != polyptych_core::scene::AlphaMode::Opaque);
+        let same_masks = !has_masks || Arc::ptr_eq(&self.scene, &other.scene);
+        let same = self.sizes == other.sizes && same_parts && same_cells && same_masks;
+        if same && lights(&self) == lights(other) { self.shadows } else { None }
+    }
+
+    /// Returns the scene with converted shapes as meshes. Polyhedra and voxels are drawn by their true faces
+    /// and stay what they are.
+    fn as_drawn(&self) -> Option<Arc<Scene>> {
+        let mut scene = (*self.scene).clone();
+        let mut changed = false;
+        for part in &self.model.parts {
+            let object = &mut scene.objects[part.object];
+            let Source::Converted(model) = &part.source else { continue };
+            let true_faces = matches!(*object.shape, Shape::Primitive(_) | Shape::Voxels(_));
+            if !(true_faces && model.bound == 0.0) {
+                object.shape = Arc::new(Shape::Mesh(model.mesh.clone()));
+                changed = true;
+            }
+        }
+        changed.then(|| Arc::new(scene))
+    }
+}

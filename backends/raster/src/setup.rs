@@ -1,0 +1,129 @@
+//! What does a tile need to know of a triangle: exact edges and the plane of its depth.
+
+/// Steps of a corner's place within a pixel: corners are snapped to 24.8 bits.
+pub(crate) const STEPS: i32 = 256;
+
+/// A corner on the picture, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScreenPoint {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) depth: f64,
+}
+
+/// How the depth of a triangle changes over one pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthPlane {
+    pub(crate) by_column: f64,
+    pub(crate) by_row: f64,
+}
+
+/// Which sides of triangles are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Sides {
+    /// Both.
+    #[default]
+    Both,
+    /// Those whose corners run counter-clockwise on the picture.
+    CounterClockwise,
+    /// Those whose corners run clockwise on the picture.
+    Clockwise,
+}
+
+/// A triangle ready to be drawn, in 64 bytes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Record {
+    /// Corners in steps, turned so that their area is positive (rows grow downward).
+    pub(crate) x: [i32; 3],
+    pub(crate) y: [i32; 3],
+    /// Depth at the first corner.
+    pub(crate) depth: f64,
+    pub(crate) plane: DepthPlane,
+    /// Depths of the corners farthest from and nearest to the eye.
+    pub(crate) farthest: f32,
+    pub(crate) nearest: f32,
+    pub(crate) id: u32,
+}
+
+impl DepthPlane {
+    /// Finds the plane through three corners; flat where they are in a line.
+    pub(crate) fn through(p: &[ScreenPoint; 3]) -> Self {
+        let (ax, ay, ad) = (p[1].x - p[0].x, p[1].y - p[0].y, p[1].depth - p[0].depth);
+        let (bx, by, bd) = (p[2].x - p[0].x, p[2].y - p[0].y, p[2].depth - p[0].depth);
+        let share = 1.0 / (ax * by - bx * ay);
+        let (by_column, by_row) = ((ad * by - bd * ay) * share, (bd * ax - ad * bx) * share);
+        if (by_column + by_row).is_finite() {
+            Self { by_column, by_row }
+        } else {
+            Self { by_column: 0.0, by_row: 0.0 }
+        }
+    }
+}
+
+/// Rounds to the nearest whole number: adding 1.5 * 2^52 leaves it in the low bits. Right below 2^31.
+fn round(v: f64) -> i32 {
+    (v + 6_755_399_441_055_744.0).to_bits() as i32
+}
+
+impl Record {
+    /// Snaps and orders the corners; nothing where no area is left or the side is not drawn.
+    ///
+    /// Triangles seen from the edge are kept while their snapped corners have area: without them pixels between
+    /// their neighbors would stay open.
+    pub(crate) fn new(points: &[ScreenPoint; 3], plane: DepthPlane, id: u32, sides: Sides) -> Option<Self> {
+        let steps = f64::from(STEPS);
+        let mut x = points.map(|p| round(p.x * steps));
+        let mut y = points.map(|p| round(p.y * steps));
+        let area =
+            i64::from(x[1] - x[0]) * i64::from(y[2] - y[0]) - i64::from(x[2] - x[0]) * i64::from(y[1] - y[0]);
+        let drawn = match sides {
+            Sides::Both => area != 0,
+            Sides::CounterClockwise => area < 0,
+            Sides::Clockwise => area > 0,
+        };
+        if !drawn {
+            return None;
+        }
+        if area < 0 {
+            x.swap(1, 2);
+            y.swap(1, 2);
+        }
+        // The plane is that of the corners before they were snapped.
+        let first = points[0];
+        let depth = first.depth
+            + plane.by_column * (f64::from(x[0]) / steps - first.x)
+            + plane.by_row * (f64::from(y[0]) / steps - first.y);
+        let depths = points.map(|p| p.depth);
+        Some(Self {
+            x,
+            y,
+            depth,
+            plane,
+            farthest: depths[0].min(depths[1]).min(depths[2]) as f32,
+            nearest: depths[0].max(depths[1]).max(depths[2]) as f32,
+            id,
+        })
+    }
+
+    /// Returns the first and last column and row whose pixel centers can be covered; maybe none.
+    pub(crate) fn pixels(&self) -> ([i32; 2], [i32; 2]) {
+        let first = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]) + (STEPS / 2 - 1)) >> 8;
+        let last = |v: &[i32; 3]| (v[0].max(v[1]).max(v[2]) - STEPS / 2) >> 8;
+        ([first(&self.x), last(&self.x)], [first(&self.y), last(&self.y)])
+    }
+
+    /// Returns the depth at a pixel's center, not yet held between those of the corners.
+    pub(crate) fn depth_at(&self, x: i32, y: i32) -> f64 {
+        let offset =
+            |pixel: i32, corner: i32| f64::from((pixel << 8) + STEPS / 2 - corner) * (1.0 / f64::from(STEPS));
+        self.depth + self.plane.by_column * offset(x, self.x[0]) + self.plane.by_row * offset(y, self.y[0])
+    }
+
+    /// Rounds a depth and holds it between those of the corners: the plane of a triangle seen from the edge is
+    /// so steep that it would stick out where a snapped corner moved over a pixel's center.
+    pub(crate) fn hold(&self, depth: f64) -> f32 {
+        let depth = depth as f32;
+        let depth = if depth < self.farthest { self.farthest } else { depth };
+        if depth > self.nearest { self.nearest } else { depth }
+    }
+}

@@ -1,0 +1,352 @@
+//! Which triangles does each light see, and does one of them stand between a point and the light?
+//!
+//! A map holds for each texel the triangle that the light sees there: the visibility buffer of the light's view.
+//! A lookup takes the four texels around a point and holds the *named triangles* against the exact point, so
+//! there is no bias and no acne: a triangle blocks
+//!
+//! 1. if the segment from the point to the light runs through it: exact edges wherever triangles are larger
+//!    than texels; or
+//! 2. if all four texels show something in front, for triangles too small to be named under the point. In front
+//!    means on both sides: the triangle's plane is in front of the point, and the triangle at the texel is in
+//!    front of the point's plane. The neighbor across a convex fold fails the second, the one across a concave
+//!    fold the first, one in the same plane both.
+//!
+//! Source of storing names instead of depths: J. C. Hourcade, A. Nicolas, *Algorithms for antialiased cast
+//! shadows*, Computers & Graphics 9(3), 1985; comparing planes instead of equal names is ours.
+
+use crate::bin::{Bins, Pass, Without};
+use crate::lens::{Lens, Rays, cube_axes, cube_face};
+use crate::light::{Cell, Lamp};
+use crate::model::{Model, Part, Role};
+use crate::resolve::{Ask, Resolver};
+use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileBuffer, TileGrid};
+use crate::transform::{ScreenVertex, transform};
+use glam::{DMat3, DVec3};
+use polyptych_core::math::{Aabb, orthonormal_basis};
+use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::scene::{LightKind, Scene};
+use polyptych_core::seam::{Cancelled, Control};
+
+/// Most texels of all maps of point and spot lights together: 128 MiB.
+const MOST_TEXELS: u64 = 32 << 20;
+/// Smallest edge of such a map that is worth drawing.
+const LEAST_EDGE: u32 = 64;
+/// Widest spot light (half angle) that one map serves.
+const WIDEST_SPOT: f64 = 1.1;
+/// Share of the largest coordinate below which points count as on a plane: several roundings of f32 corners.
+const ON_PLANE: f64 = 4e-7;
+
+/// The maps of all lights that cast shadows.
+pub(crate) struct Shadows {
+    /// Planes and maps are relative to this point.
+    pub(crate) origin: DVec3,
+    /// One for each lamp; without faces for those that cast no shadow.
+    maps: Vec<Map>,
+    /// One for each triangle of the model.
+    planes: Vec<Plane>,
+    tolerance: f64,
+}
+
+/// What a light sees: through one face, or six.
+#[derive(Default)]
+struct Map {
+    faces: Vec<MapFace>,
+}
+
+struct MapFace {
+    lens: Lens,
+    grid: TileGrid,
+    tiles: Vec<[u32; TILE_PIXELS]>,
+}
+
+/// `normal . p = offset`.
+#[derive(Clone, Copy, Default)]
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+/// The way from a point to a light.
+#[derive(Clone, Copy)]
+pub(crate) struct Sight {
+    /// Relative to [`Shadows::origin`].
+    pub(crate) place: DVec3,
+    /// The triangle that the point is on.
+    pub(crate) triangle: u32,
+    pub(crate) to_light: DVec3,
+    pub(crate) distance: f64,
+}
+
+/// Edge of the maps of each kind of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct MapSizes {
+    pub(crate) directional: u32,
+    /// Nothing where there are too many lights for maps.
+    pub(crate) local: Option<u32>,
+}
+
+impl MapSizes {
+    /// Shares the memory among the lights that cast shadows.
+    pub(crate) fn new(map_size: u32, lamps: &[Lamp]) -> Self {
+        let faces: u64 = lamps.iter().filter(|l| l.light.casts_shadow).map(|l| faces_of(&l.light.kind)).sum();
+        let fair = (MOST_TEXELS / faces.max(1)).isqrt() as u32;
+        let edge = fair.min(map_size / 2).max(LEAST_EDGE.min(map_size));
+        let fits = u64::from(edge) * u64::from(edge) * faces <= MOST_TEXELS;
+        Self { directional: map_size, local: fits.then_some(edge) }
+    }
+}
+
+/// Returns how many maps a light that is somewhere needs.
+fn faces_of(kind: &LightKind) -> u64 {
+    match kind {
+        LightKind::Directional { .. } => 0,
+        LightKind::Spot { outer, .. } if *outer <= WIDEST_SPOT => 1,
+        LightKind::Point { .. } | LightKind::Spot { .. } => 6,
+    }
+}
+
+impl Shadows {
+    /// Draws the maps of all lights that cast shadows.
+    pub(crate) fn build(
+        scene: &Scene,
+        model: &Model,
+        lamps: &[Lamp],
+        sizes: MapSizes,
+        vertices: &mut Vec<ScreenVertex>,
+        bins: &mut Bins,
+        control: &Control<'_>,
+    ) -> Result<Self, Cancelled> {
+        let origin = model.bounds.center();
+        let mut shadows = Self {
+            origin,
+            maps: Vec::with_capacity(lamps.len()),
+            planes: planes(model, origin, control.threads),
+            tolerance: ON_PLANE * model.reach.max(model.bounds.radius()),
+        };
+        let bounds = Aabb::new(model.bounds.min - origin, model.bounds.max - origin);
+        for lamp in lamps {
+            let mut map = Map::default();
+            if lamp.light.casts_shadow && !bounds.is_empty() {
+                for mut lens in lenses(&lamp.light.kind, sizes, &bounds, origin) {
+                    control.check()?;
+                    let own = lamp.cell.map(OwnFaces);
+                    lens.origin += origin;
+                    let pass = Pass {
+                        model,
+                        lens: &lens,
+                        role: Role::Light,
+                        culls_back: false,
+                        without: own.as_ref().map(|o| o as &dyn Without),
+                    };
+                    transform(model, &lens, vertices, control.threads);
+                    let grid = TileGrid::new(lens.width, lens.height);
+                    bins.fill(&pass, vertices, &grid, control.threads);
+                    let tiles = draw(scene, &pass, bins, &grid, control.threads);
+                    lens.origin -= origin;
+                    map.faces.push(MapFace { lens, grid, tiles });
+                }
+            }
+            shadows.maps.push(map);
+        }
+        Ok(shadows)
+    }
+
+    /// Returns the bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        let tiles: usize = self.maps.iter().flat_map(|m| &m.faces).map(|f| f.tiles.len()).sum();
+        (tiles * TILE_PIXELS * 4 + self.planes.len() * size_of::<Plane>()) as u64
+    }
+
+    /// Tells whether something stands between a point and a light.
+    pub(crate) fn is_blocked(&self, scene: &Scene, model: &Model, lamp: usize, sight: &Sight) -> bool {
+        let map = &self.maps[lamp];
+        let face = match map.faces.len() {
+            0 => return false,
+            1 => &map.faces[0],
+            _ => &map.faces[cube_face(sight.place - map.faces[0].lens.origin)],
+        };
+        let (x, y, ahead) = face.lens.place(sight.place - face.lens.origin);
+        let seen = ahead > 0.0
+            && (-0.5..=f64::from(face.lens.width) + 0.5).contains(&x)
+            && (-0.5..=f64::from(face.lens.height) + 0.5).contains(&y);
+        if !seen {
+            return false;
+        }
+        // The texels whose centers are the corners of the square around the place.
+        let (column, row) = ((x + 0.5) as i32 - 1, (y + 0.5) as i32 - 1);
+        let mut all_in_front = true;
+        let (mut last, mut last_before) = (NO_TRIANGLE, false);
+        for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let (u, v) = (column + dx, row + dy);
+            let id = face.triangle(u, v);
+            if id == NO_TRIANGLE || id == sight.triangle {
+                all_in_front = false;
+                continue;
+            }
+            if id != last {
+                last = id;
+                last_before = self.is_before(id, sight);
+                if last_before && self.runs_through(scene, model, id, sight) {
+                    return true;
+                }
+            }
+            all_in_front &=
+                last_before && self.is_above(face, id, (f64::from(u) + 0.5, f64::from(v) + 0.5), sight);
+        }
+        all_in_front
+    }
+
+    /// Tells whether the plane of a triangle is between the point and the light.
+    fn is_before(&self, id: u32, sight: &Sight) -> bool {
+        let plane = &self.planes[id as usize];
+        let gap = plane.offset - plane.normal.dot(sight.place);
+        let along = gap / plane.normal.dot(sight.to_light);
+        gap.abs() > self.tolerance && along > 0.0 && along < sight.distance
+    }
+
+    /// Tells whether the point of a triangle at a texel's center is on the light's side of the plane of the
+    /// point's own triangle.
+    fn is_above(&self, face: &MapFace, id: u32, texel: (f64, f64), sight: &Sight) -> bool {
+        let (plane, own) = (&self.planes[id as usize], &self.planes[sight.triangle as usize]);
+        let ray = face.lens.ray(texel.0, texel.1);
+        let start = ray.start + face.lens.origin;
+        let t = (plane.offset - plane.normal.dot(start)) / plane.normal.dot(ray.direction);
+        let height = own.normal.dot(start + ray.direction * t) - own.offset;
+        height * own.normal.dot(sight.to_light).signum() > self.tolerance
+    }
+
+    /// Tells whether the way to the light runs through a solid point of a triangle whose plane it crosses.
+    fn runs_through(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
+        let (index, triangle) = model.find(id);
+        let part = &model.parts[index];
+        let corners = part.corners(triangle, self.origin + sight.place);
+        // Volumes spanned by the way and each edge, of one sign inside (edges belong to both neighbors).
+        let weight = |a: DVec3, b: DVec3| a.cross(b).dot(sight.to_light);
+        let u = weight(corners[1], corners[2]);
+        let v = weight(corners[2], corners[0]);
+        let w = weight(corners[0], corners[1]);
+        let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+        if !inside {
+            return false;
+        }
+        let slot = part.mesh().slot(triangle);
+        if part.class(Role::Light, slot) == crate::model::Class::Solid {
+            return true;
+        }
+        let lens = Lens::parallel(self.origin + sight.place, looking(sight.to_light), [1.0; 2], [0; 2]);
+        Resolver::new(scene, model, &lens).resolve(id, &lens.ray(0.0, 0.0), Ask::Color).opacity > 0.0
+    }
+}
+
+impl MapFace {
+    fn triangle(&self, column: i32, row: i32) -> u32 {
+        if column < 0 || row < 0 || column >= self.lens.width as i32 || row >= self.lens.height as i32 {
+            return NO_TRIANGLE;
+        }
+        let (column, row) = (column as u32, row as u32);
+        let tile = (row / TILE_HEIGHT) * self.grid.columns + column / TILE_WIDTH;
+        self.tiles[tile as usize][(row % TILE_HEIGHT * TILE_WIDTH + column % TILE_WIDTH) as usize]
+    }
+}
+
+/// Leaves out the faces of the voxel that gives off the light.
+struct OwnFaces(Cell);
+
+impl Without for OwnFaces {
+    fn leaves_out(&self, part: &Part, triangle: usize) -> bool {
+        let bounds = &self.0.bounds;
+        part.object == self.0.object
+            && part.mesh().corners(triangle).iter().all(|p| {
+                let p = p.as_dvec3();
+                p.cmpge(bounds.min).all() && p.cmple(bounds.max).all()
+            })
+    }
+}
+
+fn planes(model: &Model, origin: DVec3, threads: &dyn Threads) -> Vec<Plane> {
+    let mut planes = vec![Plane::default(); model.triangles as usize];
+    for part in &model.parts {
+        let count = part.mesh().triangles.len();
+        let of_part = &mut planes[part.first_triangle as usize..][..count];
+        for_each_mut(threads, of_part, 1024, &|triangle, plane| {
+            let [a, b, c] = part.corners(triangle, origin);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            *plane = Plane { normal, offset: normal.dot(a) };
+        });
+    }
+    planes
+}
+
+/// Returns axes (right, up, backward) of a view along a direction.
+fn looking(forward: DVec3) -> DMat3 {
+    let backward = -forward.normalize_or(DVec3::NEG_Y);
+    let (right, up) = orthonormal_basis(backward);
+    DMat3::from_cols(right, up, backward)
+}
+
+/// Returns the views of a light, relative to the origin of the shadows; `bounds` hold all that blocks.
+fn lenses(kind: &LightKind, sizes: MapSizes, bounds: &Aabb, origin: DVec3) -> Vec<Lens> {
+    let near = |position: DVec3| 1e-6 * (position.length() + bounds.radius());
+    let local = sizes.local;
+    match *kind {
+        LightKind::Directional { direction } => {
+            if direction.try_normalize().is_none() {
+                return Vec::new();
+            }
+            vec![sun_lens(direction, sizes.directional, bounds)]
+        }
+        LightKind::Spot { position, direction, outer, .. } if faces_of(kind) == 1 => {
+            let Some(edge) = local else { return Vec::new() };
+            let position = position - origin;
+            let scale = f64::from(edge.saturating_sub(4).max(1)) * 0.5 / outer.max(1e-3).tan();
+            vec![Lens::central(position, looking(direction), scale, [edge; 2], near(position))]
+        }
+        LightKind::Point { position } | LightKind::Spot { position, .. } => {
+            let Some(edge) = local else { return Vec::new() };
+            let position = position - origin;
+            // Two texels more than a right angle on each side: the four texels of a place lie on one face.
+            let scale = f64::from(edge.saturating_sub(4).max(1)) * 0.5;
+            (0..6).map(|i| Lens::central(position, cube_axes(i), scale, [edge; 2], near(position))).collect()
+        }
+    }
+}
+
+/// Fits a view along parallel light to a box.
+fn sun_lens(direction: DVec3, edge: u32, bounds: &Aabb) -> Lens {
+    let axes = looking(direction);
+    let from_world = axes.transpose();
+    let fitted = Aabb::of_points(bounds.corners().map(|c| from_world * c));
+    let size = fitted.size().max(DVec3::splat(1e-9 * fitted.radius().max(1e-30)));
+    let texels = f64::from(edge.saturating_sub(2).max(1));
+    let center = fitted.center();
+    let front = fitted.max.z + size.z * 1e-3;
+    let origin = axes * DVec3::new(center.x, center.y, front);
+    Lens::parallel(origin, axes, [texels / size.x, texels / size.y], [edge; 2])
+}
+
+/// Draws what a light sees, tile by tile.
+fn draw(
+    scene: &Scene,
+    pass: &Pass<'_>,
+    bins: &Bins,
+    grid: &TileGrid,
+    threads: &dyn Threads,
+) -> Vec<[u32; TILE_PIXELS]> {
+    let mut tiles = vec![[NO_TRIANGLE; TILE_PIXELS]; grid.count()];
+    for_each_mut(threads, &mut tiles, 4, &|index, tile| {
+        let area = grid.area(index);
+        let mut buffer = TileBuffer::new();
+        for record in bins.solid(index) {
+            buffer.draw(record, &area);
+        }
+        let mut resolver = Resolver::new(scene, pass.model, pass.lens);
+        for record in bins.layers(index) {
+            buffer.draw_where(record, &area, |x, y| {
+                resolver.resolve(record.id, &pass.lens.ray(x, y), Ask::Color).opacity > 0.0
+            });
+        }
+        *tile = buffer.id;
+    });
+    debug_assert!(pass.lens.rays == Rays::Parallel || pass.lens.near > 0.0);
+    tiles
+}

@@ -1,0 +1,200 @@
+//! Which pixels of a tile does a triangle cover, and which triangle is nearest on each?
+//!
+//! Edge functions are evaluated in whole numbers on corners snapped to 24.8 bits, with the top-left rule: a
+//! pixel whose center lies on an edge that two triangles share belongs to exactly one of them. A triangle is
+//! convex, so a row of it is one span; its ends are found by exact division. (J. Pineda, *A parallel algorithm
+//! for polygon rasterization*, SIGGRAPH 1988.)
+
+use crate::setup::{Record, STEPS};
+
+/// Columns of a tile.
+pub(crate) const TILE_WIDTH: u32 = 64;
+/// Rows of a tile: those of a band, so that a band is a row of tiles.
+pub(crate) const TILE_HEIGHT: u32 = 32;
+/// Pixels of a tile.
+pub(crate) const TILE_PIXELS: usize = (TILE_WIDTH * TILE_HEIGHT) as usize;
+/// The id of no triangle.
+pub(crate) const NO_TRIANGLE: u32 = u32::MAX;
+
+/// The tiles of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TileGrid {
+    width: u32,
+    height: u32,
+    pub(crate) columns: u32,
+    pub(crate) rows: u32,
+}
+
+/// The place of a tile in the picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileArea {
+    pub(crate) x: i32,
+    pub(crate) y: i32,
+    pub(crate) width: i32,
+    pub(crate) height: i32,
+}
+
+/// The nearest triangle on every pixel of a tile, and its depth: what one may call visible.
+pub(crate) struct TileBuffer {
+    pub(crate) depth: [f32; TILE_PIXELS],
+    pub(crate) id: [u32; TILE_PIXELS],
+}
+
+/// A row of pixels that a triangle covers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span {
+    /// First pixel, counted within the tile.
+    pub(crate) first: usize,
+    pub(crate) length: usize,
+    /// Place of the first pixel in the picture.
+    pub(crate) x: i32,
+    pub(crate) y: i32,
+}
+
+impl TileGrid {
+    pub(crate) fn new(width: u32, height: u32) -> Self {
+        Self { width, height, columns: width.div_ceil(TILE_WIDTH), rows: height.div_ceil(TILE_HEIGHT) }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
+    pub(crate) fn area(&self, tile: usize) -> TileArea {
+        let (column, row) = (tile as u32 % self.columns, tile as u32 / self.columns);
+        let (x, y) = (column * TILE_WIDTH, row * TILE_HEIGHT);
+        TileArea {
+            x: x as i32,
+            y: y as i32,
+            width: TILE_WIDTH.min(self.width - x) as i32,
+            height: TILE_HEIGHT.min(self.height - y) as i32,
+        }
+    }
+
+    /// Calls `touch` for the tiles under the box around a triangle.
+    pub(crate) fn for_each_touched(&self, record: &Record, mut touch: impl FnMut(usize)) {
+        let ([x0, x1], [y0, y1]) = record.pixels();
+        let (x0, x1) = (x0.max(0), x1.min(self.width as i32 - 1));
+        let (y0, y1) = (y0.max(0), y1.min(self.height as i32 - 1));
+        if x0 > x1 || y0 > y1 {
+            return;
+        }
+        for row in y0 as u32 / TILE_HEIGHT..=y1 as u32 / TILE_HEIGHT {
+            for column in x0 as u32 / TILE_WIDTH..=x1 as u32 / TILE_WIDTH {
+                touch((row * self.columns + column) as usize);
+            }
+        }
+    }
+}
+
+/// An edge function along the rows of a tile.
+#[derive(Clone, Copy)]
+struct Edge {
+    /// Value at the first column of the current row; negative is outside.
+    value: i64,
+    by_column: i64,
+    by_row: i64,
+    /// `1 / |by_column|`.
+    inverse: f64,
+}
+
+impl Edge {
+    /// Sets up the edge between two corners at a pixel's center.
+    ///
+    /// One step to the next center changes the exact function by `256 by_column`, so dividing by 256 and
+    /// rounding down keeps every sign.
+    fn new(record: &Record, corner: usize, x: i32, y: i32) -> Self {
+        let next = (corner + 1) % 3;
+        let by_column = i64::from(record.y[corner] - record.y[next]);
+        let by_row = i64::from(record.x[next] - record.x[corner]);
+        let is_top_or_left = by_column > 0 || (by_column == 0 && by_row > 0);
+        let dx = i64::from((x << 8) + STEPS / 2 - record.x[corner]);
+        let dy = i64::from((y << 8) + STEPS / 2 - record.y[corner]);
+        let exact = by_column * dx + by_row * dy - i64::from(!is_top_or_left);
+        Self { value: exact >> 8, by_column, by_row, inverse: 1.0 / by_column.abs() as f64 }
+    }
+
+    /// Narrows a span `first..=last` of columns to the inside of the edge.
+    ///
+    /// Adding a half before dividing keeps quotients clear of whole numbers by more than the rounding error.
+    fn narrow(&self, first: &mut i32, last: &mut i32) {
+        if self.by_column > 0 {
+            if self.value < 0 {
+                let steps = ((-self.value) as f64 - 0.5) * self.inverse;
+                *first = (*first).max((steps as i32).saturating_add(1));
+            }
+        } else if self.value < 0 {
+            *last = -1;
+        } else if self.by_column < 0 {
+            *last = (*last).min(((self.value as f64 + 0.5) * self.inverse) as i32);
+        }
+    }
+}
+
+/// Calls `visit` for every row of pixels of a tile that a triangle covers, exactly.
+pub(crate) fn for_each_span(record: &Record, area: &TileArea, mut visit: impl FnMut(Span)) {
+    let ([x0, x1], [y0, y1]) = record.pixels();
+    let (x0, x1) = (x0.max(area.x), x1.min(area.x + area.width - 1));
+    let (y0, y1) = (y0.max(area.y), y1.min(area.y + area.height - 1));
+    if x0 > x1 || y0 > y1 {
+        return;
+    }
+    let mut edges = [0, 1, 2].map(|corner| Edge::new(record, corner, x0, y0));
+    for y in y0..=y1 {
+        let (mut first, mut last) = (0, x1 - x0);
+        for edge in &mut edges {
+            edge.narrow(&mut first, &mut last);
+            edge.value += edge.by_row;
+        }
+        if first <= last {
+            let x = x0 + first;
+            visit(Span {
+                first: ((y - area.y) * TILE_WIDTH as i32 + x - area.x) as usize,
+                length: (last - first + 1) as usize,
+                x,
+                y,
+            });
+        }
+    }
+}
+
+impl TileBuffer {
+    pub(crate) fn new() -> Self {
+        Self { depth: [f32::NEG_INFINITY; TILE_PIXELS], id: [NO_TRIANGLE; TILE_PIXELS] }
+    }
+
+    /// Draws a solid triangle. Of equal depths the lower id wins, so the order of triangles does not matter.
+    pub(crate) fn draw(&mut self, record: &Record, area: &TileArea) {
+        for_each_span(record, area, |span| {
+            let pixels = span.first..span.first + span.length;
+            let start = record.depth_at(span.x, span.y);
+            let targets = self.depth[pixels.clone()].iter_mut().zip(&mut self.id[pixels]);
+            for (i, (depth, id)) in targets.enumerate() {
+                let new = record.hold(start + record.plane.by_column * f64::from(i as i32));
+                let wins = (new > *depth) | ((new == *depth) & (record.id < *id));
+                *depth = if wins { new } else { *depth };
+                *id = if wins { record.id } else { *id };
+            }
+        });
+    }
+
+    /// Draws a triangle with holes; `is_solid` tells for a place of the picture, asked only where it would win.
+    pub(crate) fn draw_where(
+        &mut self,
+        record: &Record,
+        area: &TileArea,
+        mut is_solid: impl FnMut(f64, f64) -> bool,
+    ) {
+        for_each_span(record, area, |span| {
+            let start = record.depth_at(span.x, span.y);
+            for i in 0..span.length {
+                let new = record.hold(start + record.plane.by_column * i as f64);
+                let (depth, id) = (&mut self.depth[span.first + i], &mut self.id[span.first + i]);
+                let wins = new > *depth || (new == *depth && record.id < *id);
+                if wins && is_solid(f64::from(span.x + i as i32) + 0.5, f64::from(span.y) + 0.5) {
+                    (*depth, *id) = (new, record.id);
+                }
+            }
+        });
+    }
+}
