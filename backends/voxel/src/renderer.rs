@@ -229,7 +229,6 @@ impl Renderer for Voxel {
         let painter = Painter {
             view: frame.camera.view(target.width(), target.height()),
             wants: wants(target.channels()),
-            unseen: ready.world.scene.environment.background.color(frame.camera.forward()),
         };
         let [rays, shadow_rays, steps] = [const { AtomicU64::new(0) }; 3];
         let stopped = AtomicBool::new(false);
@@ -302,8 +301,6 @@ fn wants(channels: Channels) -> Wants {
 struct Painter<'a> {
     view: View<'a>,
     wants: Wants,
-    /// Color of pixels whose projection sees nothing.
-    unseen: Vec3,
 }
 
 impl Painter<'_> {
@@ -318,7 +315,8 @@ impl Painter<'_> {
                     let (u, v) = (f64::from(x) + 0.5, f64::from(band.first_row + row) + 0.5);
                     let pixel = match self.view.ray(u, v) {
                         Some(ray) => tracer.look(ray, self.wants),
-                        None => Pixel::background(self.unseen),
+                        // Outside of a fisheye's circle there is nothing to see, not even a background.
+                        None => Pixel::background(Vec3::ZERO),
                     };
                     band.put(x, row, &pixel);
                 }
