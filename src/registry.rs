@@ -13,8 +13,9 @@ pub trait BuiltinBackends {
 impl BuiltinBackends for Registry {
     fn builtin() -> Self {
         let mut registry = Self::default();
-        let factories: [Arc<dyn BackendFactory>; 4] = [
+        let factories: [Arc<dyn BackendFactory>; 5] = [
             Arc::new(polyptych_reference::Factory),
+            Arc::new(polyptych_raster::Factory),
             Arc::new(polyptych_voxel::Factory),
             Arc::new(polyptych_freeform::Factory),
             Arc::new(polyptych_stylized::Factory),

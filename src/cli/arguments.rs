@@ -83,10 +83,14 @@ pub(super) struct BenchArguments {
 
 #[derive(Args, Debug)]
 pub(super) struct ConvertArguments {
-    #[command(flatten)]
-    pub(super) scene: SceneArguments,
+    /// Scene file, model, volume, height map, or builtin:NAME.
+    #[arg(value_name = "IN")]
+    pub(super) input: String,
     /// File to write: .obj, .glb, .vox or .nrrd.
+    #[arg(value_name = "OUT")]
     pub(super) output: PathBuf,
+    #[command(flatten)]
+    pub(super) reading: ReadingArguments,
     /// Representation; must fit the file.
     #[arg(long)]
     pub(super) to: Option<Representation>,
@@ -119,12 +123,19 @@ pub(super) enum Representation {
     Volume,
 }
 
-/// Which scene, and what a file without a clear meaning holds.
+/// Which scene.
 #[derive(Args, Debug, Default)]
 pub(super) struct SceneArguments {
     /// Scene file, model, volume, height map, or builtin:NAME.
     #[arg(value_name = "SCENE", default_value = "builtin:atelier")]
     pub(super) scene: Option<String>,
+    #[command(flatten)]
+    pub(super) reading: ReadingArguments,
+}
+
+/// What a file without a clear meaning holds.
+#[derive(Args, Debug, Default)]
+pub(super) struct ReadingArguments {
     /// Size and number format of a .raw volume.
     #[arg(long, value_name = "WxHxD:u8|u16|i16|f32")]
     pub(super) volume: Option<String>,

@@ -22,7 +22,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Failure> {
             arguments.output.display()
         )));
     }
-    let scene = input::scene(&arguments.scene)?;
+    let scene = input::named_scene(&arguments.input, &arguments.reading)?;
     let longest = scene.bounds().size().max_element();
     let detail = match (arguments.tolerance, arguments.resolution) {
         (Some(tolerance), _) if tolerance > 0.0 && tolerance.is_finite() => {

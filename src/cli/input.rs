@@ -1,7 +1,7 @@
 //! What do scene and drawing options mean?
 
 use super::Failure;
-use super::arguments::{DrawArguments, ProjectionName, Quality, SceneArguments, ViewArguments};
+use super::arguments::{DrawArguments, ProjectionName, Quality, ReadingArguments, SceneArguments, ViewArguments};
 use glam::DVec3;
 use polyptych::camera::{Camera, Projection};
 use polyptych::load::{LoadOptions, RawVolume, load};
@@ -17,18 +17,20 @@ const SIZE: [u32; 2] = [960, 540];
 
 /// Loads the scene that was named.
 pub(super) fn scene(arguments: &SceneArguments) -> Result<Arc<Scene>, Failure> {
-    let name = arguments.scene.as_deref().unwrap_or("builtin:atelier");
+    named_scene(arguments.scene.as_deref().unwrap_or("builtin:atelier"), &arguments.reading)
+}
+
+/// Loads a scene by its name: a file or `builtin:NAME`.
+pub(super) fn named_scene(name: &str, reading: &ReadingArguments) -> Result<Arc<Scene>, Failure> {
     if let Some(builtin) = name.strip_prefix("builtin:") {
         return builtin::scene(builtin).map(Arc::new).map_err(Failure::input);
     }
-    let volume = arguments
+    let volume = reading
         .volume
         .as_deref()
-        .map(|text| {
-            text.parse::<RawVolume>().map_err(|e| Failure::wrong_use(format!("--volume {text}: {e}")))
-        })
+        .map(|text| text.parse::<RawVolume>().map_err(|e| Failure::wrong_use(format!("--volume {text}: {e}"))))
         .transpose()?;
-    let options = LoadOptions { volume, height_map: arguments.height_map, ..LoadOptions::default() };
+    let options = LoadOptions { volume, height_map: reading.height_map, ..LoadOptions::default() };
     load(Path::new(name), &options).map(Arc::new).map_err(Failure::input)
 }
 

@@ -9,6 +9,7 @@ use super::{VoxelModel, height_mesh, primitive_mesh};
 use crate::math::Aabb;
 use crate::scene::{Form, FreeForm, Mesh, Object, Scene, Shape, Volume, Voxels};
 use glam::{DAffine3, DVec3, Vec3};
+use std::collections::HashMap;
 
 /// Returns the number of cells along each axis and their edge: the diagonal of a cell is the bound.
 pub(super) fn grid_size(bounds: &Aabb, tolerance: f64, max_resolution: u32) -> ([u32; 3], f64) {
@@ -40,7 +41,7 @@ pub(super) fn voxelize(
     let (size, cell) = grid_size(&bounds, tolerance, max_resolution);
     let covered = DVec3::from_array(size.map(f64::from)) * cell;
     let grid = Grid { size, cell, first: bounds.center() - covered * 0.5 };
-    let mut cells = CellColors { colors: ColorCollector::default(), keys: Vec::new() };
+    let mut cells = CellColors::new(size);
     match &*object.shape {
         Shape::Mesh(mesh) => fill_mesh(scene, object, mesh, &grid, &mut cells),
         Shape::HeightField(field) => {
@@ -64,10 +65,9 @@ pub(super) fn voxelize(
         return Err("it fills no voxel: it is empty or thinner than a cell".to_owned());
     }
     let palette = cells.colors.choose(scene, object);
-    let mut bytes = vec![0u8; size.iter().map(|&s| s as usize).product()];
-    for (index, key) in cells.keys {
-        bytes[index] = palette.byte(key);
-    }
+    let byte_of: Vec<u8> =
+        std::iter::once(0).chain(cells.keys.iter().map(|&key| palette.byte(key))).collect();
+    let bytes: Vec<u8> = cells.grid.iter().map(|&number| byte_of[number as usize]).collect();
     let [x, y, z] = size;
     Ok(VoxelModel {
         voxels: Voxels::from_bytes(size, &bytes),
@@ -103,13 +103,34 @@ impl Grid {
 /// Filled cells with their colors; a cell named again keeps its last color.
 struct CellColors {
     colors: ColorCollector,
-    keys: Vec<(usize, ColorKey)>,
+    /// Colors by their number, counted from 1.
+    keys: Vec<ColorKey>,
+    number_of: HashMap<ColorKey, u32>,
+    /// The number of each cell's color, 0 where it is empty.
+    grid: Vec<u32>,
 }
 
 impl CellColors {
-    fn fill(&mut self, index: usize, slot: u16, color: Vec3) {
+    fn new(size: [u32; 3]) -> Self {
+        Self {
+            colors: ColorCollector::default(),
+            keys: Vec::new(),
+            number_of: HashMap::new(),
+            grid: vec![0; size.iter().map(|&s| s as usize).product()],
+        }
+    }
+
+    /// Notes a color and returns its number.
+    fn number(&mut self, slot: u16, color: Vec3) -> u32 {
         let key = self.colors.note(slot, color);
-        self.keys.push((index, key));
+        *self.number_of.entry(key).or_insert_with(|| {
+            self.keys.push(key);
+            self.keys.len() as u32
+        })
+    }
+
+    fn fill(&mut self, index: usize, slot: u16, color: Vec3) {
+        self.grid[index] = self.number(slot, color);
     }
 }
 
@@ -167,8 +188,10 @@ fn fill_form(
     uv: &UvAt<'_>,
     cells: &mut CellColors,
 ) {
+    let form = &form.lowered();
     let material = scene.material(object, 0);
-    let textured = material.texture.is_some();
+    // One color for all cells, unless a texture says otherwise.
+    let plain = material.texture.is_none().then_some(material.base_color);
     let mut stack = vec![([0u32; 3], grid.size)];
     while let Some((from, to)) = stack.pop() {
         let box_ = Aabb::new(grid.corner(from), grid.corner(to));
@@ -189,17 +212,19 @@ fn fill_form(
         if !solid && form.value(box_.center()) < 0.0 {
             continue;
         }
+        let number = plain.map(|color| cells.number(0, color));
         for z in from[2]..to[2] {
             for y in from[1]..to[1] {
                 for x in from[0]..to[0] {
-                    let color = if textured {
-                        let p = grid.corner([x, y, z]) + grid.cell * 0.5;
-                        let n = -form.value_and_gradient(p).1.normalize_or(DVec3::Y);
-                        scene.base_color(material, uv(p, n), p.as_vec3(), n.as_vec3(), 0.0).0
-                    } else {
-                        material.base_color
-                    };
-                    cells.fill(grid.index([x, y, z]), 0, color);
+                    let index = grid.index([x, y, z]);
+                    if let Some(number) = number {
+                        cells.grid[index] = number;
+                        continue;
+                    }
+                    let p = grid.corner([x, y, z]) + grid.cell * 0.5;
+                    let n = -form.value_and_gradient(p).1.normalize_or(DVec3::Y);
+                    let color = scene.base_color(material, uv(p, n), p.as_vec3(), n.as_vec3(), 0.0).0;
+                    cells.fill(index, 0, color);
                 }
             }
         }

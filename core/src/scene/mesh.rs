@@ -31,7 +31,7 @@ impl Mesh {
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         let used = self.triangles.iter().flatten().chain(self.segments.iter().flatten());
-        Aabb::of_points(used.map(|&i| self.positions[i as usize].as_dvec3()))
+        Aabb::of_points(used.filter_map(|&i| self.positions.get(i as usize)).map(|p| p.as_dvec3()))
     }
 
     /// Returns the material slot of a triangle.

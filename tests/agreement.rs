@@ -1,0 +1,82 @@
+//! Are the pictures the same pictures? Back ends against the reference, in one table.
+
+mod common;
+
+use common::{builtin, model, models, need, studio};
+use polyptych::metrics::{Errors, Gate};
+use polyptych::prelude::*;
+use std::sync::Arc;
+
+/// Draws a scene with a back end and the reference and returns the errors; the gate must hold.
+fn agree(backend: &str, scene: &Arc<Scene>, name: &str) -> Errors {
+    let mut studio = studio(2);
+    let need = need(scene, 384, 216);
+    let reference = studio.draw("reference", scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
+    let picture = studio.draw(backend, scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
+    let errors = Errors::between(&picture, &reference);
+    let verdict = Gate::EDGE_TOLERANT.judge(&errors, 384 * 216);
+    if !verdict.passed {
+        // A failing picture is left with its reference.
+        let folder = std::env::temp_dir().join("polyptych-agreement");
+        for (which, picture) in [("reference", &reference), (backend, &picture)] {
+            let file = folder.join(format!("{}-{which}.png", name.replace(['/', '.'], "-")));
+            polyptych::picture::save(picture, Channel::Color, &file).unwrap_or_else(|e| panic!("{e}"));
+        }
+        panic!(
+            "{backend} on {name}: {}; pictures in {}; again: polyptych compare {name} -b {backend} --size 384x216 --gate",
+            verdict.failed.join(", "),
+            folder.display()
+        );
+    }
+    errors
+}
+
+/// Distances of a back end on its own kind of shape; the bound of each with its reason.
+fn assert_distances(errors: &Errors, relative: f64, name: &str) {
+    let distance = errors.distance.unwrap_or_default();
+    assert!(distance.relative <= relative, "{name}: relative distance error {:e}", distance.relative);
+}
+
+#[test]
+fn built_in_scenes_agree_with_the_reference() {
+    // Single precision distances in the picture are right to 6e-8 of themselves; the rasterizer's own planes and
+    // the tessellated ball and ring of the still life add theirs.
+    for (backend, scene, relative) in [
+        ("raster", "polyhedra", 1e-4),
+        ("voxel", "figure", 1e-7),
+        ("freeform", "polyhedra", 1e-6),
+        ("freeform", "quadrics", 1e-6),
+        ("freeform", "terrain", 1e-6),
+        ("freeform", "cloud", 1e-3),
+    ] {
+        let errors = agree(backend, &builtin(scene), &format!("builtin:{scene}"));
+        assert_distances(&errors, relative, scene);
+    }
+}
+
+#[test]
+fn models_agree_with_the_reference() {
+    let Some(folder) = models() else { return };
+    for (backend, path) in [
+        ("raster", "mesh/stanford-bunny.obj"),
+        ("raster", "mesh/spot/spot.obj"),
+        ("raster", "mesh/suzanne.obj"),
+        ("raster", "gltf/trimesh/Duck.glb"),
+        ("voxel", "vox/ogt_test_groups.vox"),
+        ("voxel", "vox/monu10.vox"),
+        ("freeform", "height/maunga_whau_volcano_16.png"),
+    ] {
+        agree(backend, &model(&folder.join(path)), path);
+    }
+}
+
+#[test]
+fn the_voxel_walk_has_no_error_of_its_own() {
+    let Some(folder) = models() else { return };
+    for path in ["vox/chr_knight.vox", "vox/menger.vox", "vox/teapot.vox"] {
+        let errors = agree("voxel", &model(&folder.join(path)), path);
+        assert_eq!(errors.id_agreement, Some(1.0), "{path}");
+        assert_distances(&errors, 1e-7, path);
+        assert!(errors.color.is_some_and(|c| c.rmse < 1e-3), "{path}: {:?}", errors.color);
+    }
+}

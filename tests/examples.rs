@@ -1,0 +1,14 @@
+//! Do the examples run, and does a new back end need nothing of another's files?
+
+#[path = "../examples/write_a_backend.rs"]
+mod write_a_backend;
+
+#[test]
+fn a_back_end_is_written_in_one_file_and_draws() {
+    write_a_backend::main().unwrap();
+    let picture = image::open("out/boxes.png").unwrap().to_rgb8();
+    assert_eq!(picture.dimensions(), (480, 270));
+    let middle = picture.get_pixel(240, 150);
+    let corner = picture.get_pixel(2, 2);
+    assert_ne!(middle, corner, "something is drawn in the middle");
+}

@@ -1,0 +1,87 @@
+//! Do the same shapes as mesh, volume and voxels agree with closed forms, within the bounds that are stated?
+
+mod common;
+
+use common::{model, models};
+use polyptych::convert::{Converter, Detail};
+use polyptych::parallel::OneThread;
+use polyptych::prelude::*;
+use std::f64::consts::PI;
+
+/// Volumes and areas of the truth set.
+const SPHERE: (f64, f64) = (4.0 / 3.0 * PI, 4.0 * PI);
+const TORUS: (f64, f64) = (2.0 * PI * PI * 0.7 * 0.09, 4.0 * PI * PI * 0.7 * 0.3);
+
+#[test]
+fn meshes_of_the_truth_set_enclose_the_volume_within_a_layer_of_their_error() {
+    let Some(folder) = models() else { return };
+    // The chord error of the coarsest ring bounds the distance from the true surface.
+    let sagitta = |radius: f64, steps: f64| radius * (1.0 - (PI / steps).cos());
+    for (file, (volume, area), bound) in [
+        ("sphere_8x16.obj", SPHERE, sagitta(1.0, 16.0) * 2.0),
+        ("sphere_32x64.obj", SPHERE, sagitta(1.0, 64.0) * 2.0),
+        ("torus_24.obj", TORUS, sagitta(1.0, 24.0) + sagitta(0.3, 12.0)),
+        ("torus_96.obj", TORUS, sagitta(1.0, 96.0) + sagitta(0.3, 48.0)),
+    ] {
+        let scene = model(&folder.join("mesh/truth").join(file));
+        let Shape::Mesh(mesh) = &*scene.objects[0].shape else { panic!("{file} is a mesh") };
+        assert!((mesh.volume() - volume).abs() <= area * bound, "{file}: {} for {volume}", mesh.volume());
+    }
+}
+
+#[test]
+fn conversions_agree_with_closed_forms_within_their_bounds() {
+    let scene = Scene::default();
+    let converter = Converter::default();
+    for (primitive, (volume, area)) in [
+        (Primitive::Sphere { radius: 1.0 }, SPHERE),
+        (Primitive::Torus { major: 0.7, minor: 0.3 }, TORUS),
+        (Primitive::Box { size: DVec3::splat(1.6) }, (1.6f64.powi(3), 6.0 * 1.6 * 1.6)),
+    ] {
+        let form = FreeForm::from_primitive(&primitive).expect("a solid");
+        for shape in [Shape::Primitive(primitive), Shape::FreeForm(form)] {
+            let object = Object::new("truth", shape, 0);
+            let detail = Detail { tolerance: 0.004, max_resolution: 256 };
+            let mesh = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+            let error = (mesh.mesh.volume() - volume).abs();
+            assert!(error <= area * mesh.bound + 1e-5, "{primitive:?}: mesh off by {error}, bound {}", mesh.bound);
+
+            let voxels = converter.voxels(&scene, &object, Detail { max_resolution: 128, ..detail }).unwrap();
+            let cell = voxels.object_from_voxels.matrix3.determinant();
+            let error = (voxels.voxels.filled() as f64 * cell - volume).abs();
+            assert!(error <= area * voxels.bound, "{primitive:?}: voxels off by {error}, bound {}", voxels.bound);
+
+            let field = converter.distance(&scene, &object, Detail { max_resolution: 64, ..detail }, &OneThread).unwrap();
+            let inside = field.distances.iter().filter(|d| **d >= 0.0).count() as f64 * field.step.powi(3);
+            let error = (inside - volume).abs();
+            assert!(error <= area * field.bound, "{primitive:?}: distances off by {error}, bound {}", field.bound);
+        }
+    }
+}
+
+#[test]
+fn voxel_models_of_the_truth_set_show_the_sphere_and_the_torus() {
+    let Some(folder) = models() else { return };
+    let scene = model(&folder.join("vox/truth_sphere_64_solid.vox"));
+    let Shape::Voxels(voxels) = &*scene.objects[0].shape else { panic!("voxels") };
+    let cell = 2.4 / 64.0;
+    let volume = voxels.filled() as f64 * f64::powi(cell, 3);
+    assert!((volume - SPHERE.0).abs() < SPHERE.1 * cell * 0.1, "{volume}");
+}
+
+#[test]
+fn volumes_of_the_truth_set_have_their_surface_at_the_level() {
+    let Some(folder) = models() else { return };
+    for (file, (volume, area)) in [("sphere_64_u8.nrrd", SPHERE), ("torus_96_u8.nrrd", TORUS)] {
+        let mut scene = (*model(&folder.join("volume/truth").join(file))).clone();
+        let Shape::Volume(field) = &*scene.objects[0].shape else { panic!("{file} is a volume") };
+        let mut field = field.clone();
+        let point = |value: f32, opacity: f32| polyptych::scene::TransferPoint { value, color: Vec3::ONE, opacity };
+        field.transfer.points = vec![point(127.0, 0.0), point(129.0, 1.0)];
+        scene.objects[0].shape = std::sync::Arc::new(Shape::Volume(field));
+        let detail = Detail { tolerance: 0.01, max_resolution: 128 };
+        let mesh = Converter::default().mesh(&scene, &scene.objects[0], detail, &OneThread).unwrap();
+        let error = (mesh.mesh.volume() - volume).abs();
+        assert!(error <= area * mesh.bound * 0.25, "{file}: off by {error}, bound {}", mesh.bound);
+    }
+}
