@@ -81,6 +81,7 @@ fn info() -> BackendInfo {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         native: ShapeKind::ALL.to_vec(),
         channels: Channels::ALL,
+        photometric: true,
         parameters: vec![
             Parameter {
                 name: "samples",
