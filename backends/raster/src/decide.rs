@@ -24,11 +24,6 @@ pub(crate) fn why_skipped(object: &Object) -> Option<String> {
     if !object.visible {
         return Some("it is invisible".to_owned());
     }
-    if let Shape::Mesh(mesh) = &*object.shape
-        && let Err(wrong) = mesh.check()
-    {
-        return Some(wrong);
-    }
     if let Some(why) = object.why_undrawable() {
         return Some(why.to_owned());
     }

@@ -16,7 +16,7 @@ use crate::transform::{ScreenVertex, transform};
 use polyptych_core::camera::Camera;
 use polyptych_core::convert::{Converter, Detail, MeshModel};
 use polyptych_core::framebuffer::{Channel, Framebuffer};
-use polyptych_core::scene::{Light, Material, Object, Scene, Shape};
+use polyptych_core::scene::{Light, Object, Scene, Shape};
 use polyptych_core::seam::{
     BackendFactory, BackendInfo, Cancelled, Control, Counter, Decision, Frame, Need, Phases, Plan, Prepared,
     Registry, RenderError, Renderer, Report,
@@ -78,7 +78,8 @@ struct Scratch {
 struct Conversion {
     shape: Arc<Shape>,
     matrix: glam::DMat3,
-    materials: Vec<Material>,
+    /// Which slots let light through: it decides which faces of voxels are seen.
+    see_through: Vec<bool>,
     /// Half octaves of tolerance, the converter's own classes.
     class: i32,
     model: Arc<MeshModel>,
@@ -95,6 +96,12 @@ impl Raster {
     #[must_use]
     pub fn new() -> Self {
         Self { info: info(), ready: None, converted: Vec::new(), scratch: Scratch::default() }
+    }
+
+    /// Returns the shadow maps, to tell whether they were kept.
+    #[cfg(test)]
+    pub(crate) fn shadows(&self) -> Option<Arc<Shadows>> {
+        self.ready.as_ref()?.shadows.clone()
     }
 
     /// Decides about all objects and converts what must be.
@@ -153,7 +160,7 @@ impl Raster {
         Ok(Conversion {
             shape: object.shape.clone(),
             matrix: object.world_from_object.matrix3,
-            materials: materials(scene, object),
+            see_through: see_through(scene, object),
             class: class(detail),
             model,
         })
@@ -165,7 +172,7 @@ impl Conversion {
         Arc::ptr_eq(&self.shape, &object.shape)
             && self.class == class(detail)
             && self.matrix == object.world_from_object.matrix3
-            && self.materials == materials(scene, object)
+            && self.see_through == see_through(scene, object)
     }
 }
 
@@ -173,8 +180,8 @@ fn class(detail: Detail) -> i32 {
     (detail.tolerance.log2() * 2.0 + 1e-9).floor() as i32
 }
 
-fn materials(scene: &Scene, object: &Object) -> Vec<Material> {
-    (0..object.materials.len()).map(|slot| scene.material(object, slot).clone()).collect()
+fn see_through(scene: &Scene, object: &Object) -> Vec<bool> {
+    (0..object.materials.len()).map(|slot| scene.material(object, slot).is_see_through()).collect()
 }
 
 impl Renderer for Raster {

@@ -1,0 +1,192 @@
+//! Does it keep the promises of the seam: sizes, threads, reports, reuse, cancelling?
+
+use super::{camera, cube, draw, plane, scene_of};
+use crate::Raster;
+use glam::{DVec3, Vec3};
+use polyptych_core::camera::{Camera, Projection};
+use polyptych_core::convert::Converter;
+use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
+use polyptych_core::parallel::{OneThread, Pool, Threads};
+use polyptych_core::scene::{Light, Material, Primitive, Scene, Shape, Voxels};
+use polyptych_core::seam::{Control, Decision, Need, RenderError, Renderer};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// A bit of everything.
+fn mixed() -> Scene {
+    let torus = Shape::Primitive(Primitive::Torus { major: 0.7, minor: 0.25 });
+    let voxels = Voxels::from_fn([4, 3, 4], |x, y, z| u8::from((x + y + z) % 2 == 0));
+    let mut scene = scene_of(vec![
+        (plane(30.0), [0.0, -0.5, 0.0]),
+        (cube(1.0), [0.0; 3]),
+        (torus, [1.3, 0.2, 0.4]),
+        (Shape::Voxels(voxels), [-4.0, -0.4, -3.0]),
+        (cube(0.8), [0.4, 0.0, 1.2]),
+    ]);
+    let glass = scene.add_material(Material { opacity: 0.4, ..Material::new(Vec3::new(0.2, 0.8, 0.4)) });
+    scene.objects[4].materials = vec![glass];
+    scene.lights =
+        vec![Light::directional(DVec3::new(-0.4, -1.0, -0.2)), Light::point(DVec3::new(1.0, 3.0, 2.0), 5.0)];
+    scene
+}
+
+fn need_of(camera: Camera, width: u32, height: u32) -> Need {
+    Need { channels: Channels::ALL, ..Need::new(camera, width, height) }
+}
+
+#[test]
+fn every_number_of_threads_gives_the_same_bytes() {
+    let scene = Arc::new(mixed());
+    for projection in [Projection::Perspective { fov_y: 0.8 }, Projection::Fisheye { fov: 3.0 }] {
+        let camera = Camera { projection, ..camera([2.0, 1.7, 4.0], [0.0; 3]) };
+        let need = need_of(camera, 157, 103);
+        let pools = [2, 4].map(|n| Pool::new(n).unwrap());
+        let all: Vec<Framebuffer> = [&OneThread as &dyn Threads, &pools[0], &pools[1]]
+            .into_iter()
+            .map(|threads| {
+                let (control, mut raster) = (Control::new(threads), Raster::new());
+                raster.prepare(&scene, &need, &Converter::default(), &control).unwrap();
+                let mut picture = Framebuffer::new(157, 103, need.channels);
+                raster.render(&need.frame(), &mut picture, &control).unwrap();
+                picture
+            })
+            .collect();
+        assert!(all.iter().all(|p| p.same_bits(&all[0])));
+        assert_eq!(all[0].count_not_finite(), 0);
+    }
+}
+
+#[test]
+fn pictures_of_any_size_are_drawn() {
+    let scene = mixed();
+    let camera = camera([2.0, 1.7, 4.0], [0.0; 3]);
+    for (width, height) in [(0, 0), (0, 5), (1, 1), (1, 7), (13, 11), (20_001, 1), (1, 3001)] {
+        let picture = draw(&scene, camera.clone(), width, height);
+        assert_eq!(picture.count_not_finite(), 0);
+        assert!(width == 0 || picture.id().iter().any(|&id| id > 0), "{width}x{height}");
+    }
+}
+
+#[test]
+fn channels_that_were_not_asked_for_change_nothing() {
+    let scene = mixed();
+    let camera = camera([2.0, 1.7, 4.0], [0.0; 3]);
+    let all = draw(&scene, camera.clone(), 61, 47);
+    for channel in Channel::ALL {
+        let need = Need { channels: Channels::of(&[channel]), ..Need::new(camera.clone(), 61, 47) };
+        let (mut raster, control) = (Raster::new(), Control::simple());
+        raster.prepare(&Arc::new(scene.clone()), &need, &Converter::default(), &control).unwrap();
+        let mut picture = Framebuffer::new(61, 47, need.channels);
+        raster.render(&need.frame(), &mut picture, &control).unwrap();
+        let same = match channel {
+            Channel::Color => picture.color() == all.color(),
+            Channel::Distance => picture.distance() == all.distance(),
+            Channel::Normal => picture.normal() == all.normal(),
+            Channel::Id => picture.id() == all.id(),
+            Channel::Albedo => picture.albedo() == all.albedo(),
+            Channel::Shadow => picture.shadow() == all.shadow(),
+            Channel::Coverage => picture.coverage() == all.coverage(),
+        };
+        assert!(same, "{channel:?}");
+    }
+}
+
+#[test]
+fn decisions_say_what_was_done() {
+    let mut scene = mixed();
+    scene.objects[1].visible = false;
+    let mirror = scene.add_material(Material { reflectivity: 0.5, ..Material::default() });
+    scene.objects[0].materials = vec![mirror];
+    let scene = Arc::new(scene);
+    let camera = camera([2.0, 1.7, 4.0], [0.0; 3]);
+    let need = need_of(camera.clone(), 61, 47);
+    let mut raster = Raster::new();
+    let planned = raster.plan(&scene, &need);
+    let prepared = raster.prepare(&scene, &need, &Converter::default(), &Control::simple()).unwrap();
+    let words: Vec<_> = prepared.objects.iter().map(Decision::word).collect();
+    assert_eq!(words, ["approximated", "skipped", "converted", "exact", "exact"]);
+    assert_eq!(planned.objects.iter().map(|o| o.decision.word()).collect::<Vec<_>>(), words);
+    assert_eq!(prepared.objects[0].why(), "reflections are not drawn");
+    assert_eq!(prepared.objects[1].why(), "it is invisible");
+    assert!(prepared.objects[2].bound().is_some_and(|b| b > 0.0 && b < 0.05));
+    assert!(planned.passes.iter().any(|p| p.needed && p.name == "shadow map of light 1"));
+    let model = raster.model().unwrap();
+    assert!(matches!(*model.objects[2].shape, Shape::Mesh(_)));
+    assert!(Arc::ptr_eq(&model.objects[3].shape, &scene.objects[3].shape));
+    let bent = Camera { projection: Projection::Fisheye { fov: 2.0 }, ..camera };
+    let planned = raster.plan(&scene, &need_of(bent, 61, 47));
+    assert_eq!(planned.objects[3].decision.why(), "resampled from perspective faces");
+}
+
+#[test]
+fn a_required_object_that_cannot_be_drawn_is_refused() {
+    let mut scene = mixed();
+    scene.objects[2].required = true;
+    scene.objects[2].world_from_object.matrix3 = glam::DMat3::ZERO;
+    let need = need_of(camera([2.0, 1.7, 4.0], [0.0; 3]), 8, 8);
+    let mut raster = Raster::new();
+    let error =
+        raster.prepare(&Arc::new(scene), &need, &Converter::default(), &Control::simple()).unwrap_err();
+    assert!(matches!(error, RenderError::Required { ref object, .. } if object == "object 2"), "{error}");
+    let mut picture = Framebuffer::new(8, 8, Channels::COLOR);
+    let error = raster.render(&need.frame(), &mut picture, &Control::simple()).unwrap_err();
+    assert_eq!(error, RenderError::NotPrepared);
+}
+
+#[test]
+fn what_did_not_change_is_kept() {
+    let mut scene = mixed();
+    let need = need_of(camera([2.0, 1.7, 4.0], [0.0; 3]), 61, 47);
+    let (mut raster, control) = (Raster::new(), Control::simple());
+    raster.prepare(&Arc::new(scene.clone()), &need, &Converter::default(), &control).unwrap();
+    let maps_of = |raster: &Raster| raster.shadows().unwrap();
+    let maps = maps_of(&raster);
+    // A color makes no new maps.
+    scene.materials[0].base_color = Vec3::X;
+    raster.prepare(&Arc::new(scene.clone()), &need, &Converter::default(), &control).unwrap();
+    assert!(Arc::ptr_eq(&maps, &maps_of(&raster)));
+    scene.objects[1].world_from_object.translation.x += 0.1;
+    raster.prepare(&Arc::new(scene), &need, &Converter::default(), &control).unwrap();
+    assert!(!Arc::ptr_eq(&maps, &maps_of(&raster)), "a thing that blocks light moved");
+}
+
+#[test]
+fn no_map_is_drawn_that_nobody_needs() {
+    let scene = Arc::new(mixed());
+    let (mut raster, control) = (Raster::new(), Control::simple());
+    let need =
+        Need { channels: Channels::of(&[Channel::Id]), ..need_of(camera([2.0, 1.7, 4.0], [0.0; 3]), 9, 9) };
+    raster.prepare(&scene, &need, &Converter::default(), &control).unwrap();
+    assert!(raster.shadows().is_none());
+    let mut need = need_of(need.camera, 9, 9);
+    let declared = raster.info().parameters.clone();
+    need.settings.set("raster", &declared, "shadow", "off").unwrap();
+    let prepared = raster.prepare(&scene, &need, &Converter::default(), &control).unwrap();
+    assert!(raster.shadows().is_none());
+    assert_eq!(prepared.objects[1].why(), "shadows are switched off");
+}
+
+#[test]
+fn a_cancelled_frame_can_be_drawn_again() {
+    let scene = Arc::new(mixed());
+    let need = need_of(camera([2.0, 1.7, 4.0], [0.0; 3]), 61, 47);
+    let (mut raster, control) = (Raster::new(), Control::simple());
+    let stop = AtomicBool::new(true);
+    let stopped = Control::simple().cancelled_by(&stop);
+    let error = raster.prepare(&scene, &need, &Converter::default(), &stopped).unwrap_err();
+    assert_eq!(error, RenderError::Cancelled);
+    raster.prepare(&scene, &need, &Converter::default(), &control).unwrap();
+    let mut picture = Framebuffer::new(61, 47, need.channels);
+    assert_eq!(raster.render(&need.frame(), &mut picture, &stopped).unwrap_err(), RenderError::Cancelled);
+    let report = raster.render(&need.frame(), &mut picture, &control).unwrap();
+    assert!(report.counters[0].is_some_and(|c| c.count > 100));
+    assert!(picture.same_bits(&draw(&scene, need.camera.clone(), 61, 47)));
+}
+
+#[test]
+fn an_eye_inside_of_things_and_empty_scenes_are_fine() {
+    let picture = draw(&mixed(), camera([0.0; 3], [0.0, 0.0, -1.0]), 31, 31);
+    assert!(picture.id().iter().all(|&id| id == 2), "the inside of the box");
+    let empty = draw(&Scene::default(), camera([0.0; 3], [0.0, 0.0, -1.0]), 31, 31);
+    assert!(empty.id().iter().all(|&id| id == 0) && empty.count_not_finite() == 0);
+}
