@@ -6,7 +6,8 @@ use polyptych::convert::Converter;
 use polyptych::framebuffer::Pixel;
 use polyptych::prelude::*;
 use polyptych::seam::{
-    BackendFactory, BackendInfo, Control, Decision, Frame, ObjectPlan, Origin, Plan, Prepared, RenderError, Report,
+    BackendFactory, BackendInfo, Control, Decision, Frame, ObjectPlan, Origin, Plan, Prepared, RenderError,
+    Report,
 };
 use std::sync::Arc;
 
@@ -18,7 +19,15 @@ struct BoxesFactory;
 impl BackendFactory for BoxesFactory {
     fn info(&self) -> BackendInfo {
         let (id, name, version) = ("boxes".into(), "Bounding boxes".into(), "0.1.0".into());
-        BackendInfo { id, name, version, native: vec![], channels: Channels::ALL, photometric: false, parameters: vec![] }
+        BackendInfo {
+            id,
+            name,
+            version,
+            native: vec![],
+            channels: Channels::ALL,
+            photometric: false,
+            parameters: vec![],
+        }
     }
     fn create(&self, _: &Registry) -> Box<dyn Renderer> {
         Box::new(Boxes::default())
@@ -41,15 +50,27 @@ impl Renderer for Boxes {
         };
         Plan { objects: scene.objects.iter().map(object).collect(), ..Plan::default() }
     }
-    fn prepare(&mut self, scene: &Arc<Scene>, _: &Need, _: &Converter, _: &Control<'_>) -> Result<Prepared, RenderError> {
+    fn prepare(
+        &mut self,
+        scene: &Arc<Scene>,
+        _: &Need,
+        _: &Converter,
+        _: &Control<'_>,
+    ) -> Result<Prepared, RenderError> {
         self.0 = Some(scene.clone());
         Ok(Prepared { objects: scene.objects.iter().map(decision).collect(), bytes: 0 })
     }
-    fn render(&mut self, frame: &Frame, target: &mut Framebuffer, control: &Control<'_>) -> Result<Report, RenderError> {
+    fn render(
+        &mut self,
+        frame: &Frame,
+        target: &mut Framebuffer,
+        control: &Control<'_>,
+    ) -> Result<Report, RenderError> {
         let scene = self.0.as_ref().ok_or(RenderError::NotPrepared)?;
         let view = frame.camera.view(target.width(), target.height());
         target.for_each_band(control.threads, 16, &|mut band| {
-            for (x, row) in (0..band.width).flat_map(|x| (0..band.rows).map(move |row| (x, row))) {
+            let (width, rows) = (band.width, band.rows);
+            for (x, row) in (0..width).flat_map(|x| (0..rows).map(move |row| (x, row))) {
                 let place = (f64::from(x) + 0.5, f64::from(band.first_row + row) + 0.5);
                 let Some(ray) = view.ray(place.0, place.1) else { continue };
                 let mut pixel = Pixel::background(scene.environment.background.color(ray.direction));
@@ -69,8 +90,8 @@ impl Renderer for Boxes {
     }
 }
 
-#[allow(missing_docs, reason = "an example's main needs none")]
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut registry = Registry::builtin();
     registry.add(Arc::new(BoxesFactory), Origin::BuiltIn);
     let scene = Arc::new(polyptych::builtin::scene("polyhedra")?);

@@ -33,7 +33,10 @@ fn same_bytes_for_any_number_of_threads(backend: &str) {
     let need = coarse(backend, &scene, 97, 61);
     let one = draw(backend, 1, &scene, &need).framebuffer;
     for threads in [2, 4] {
-        assert!(draw(backend, threads, &scene, &need).framebuffer.same_bits(&one), "{threads} threads differ");
+        assert!(
+            draw(backend, threads, &scene, &need).framebuffer.same_bits(&one),
+            "{threads} threads differ"
+        );
     }
 }
 
@@ -53,7 +56,8 @@ fn every_size_is_drawn(backend: &str) {
     let scene = builtin("polyhedra");
     let mut studio = studio(2);
     for (width, height) in [(0, 0), (0, 5), (1, 1), (1, 7), (13, 11), (257, 3)] {
-        let picture = studio.draw(backend, &scene, &coarse(backend, &scene, width, height)).unwrap().framebuffer;
+        let picture =
+            studio.draw(backend, &scene, &coarse(backend, &scene, width, height)).unwrap().framebuffer;
         assert_eq!((picture.width(), picture.height()), (width, height));
         assert_eq!(picture.count_not_finite(), 0, "{width}x{height}");
     }

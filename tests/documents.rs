@@ -8,7 +8,9 @@ fn paths(text: &str) -> Vec<&str> {
     quoted
         .filter(|w| !w.contains(char::is_whitespace) && !w.contains("::") && !w.starts_with(['-', '/', '.']))
         .filter(|w| w.contains('/') || [".rs", ".md", ".toml", ".ron"].iter().any(|e| w.ends_with(e)))
-        .filter(|w| !w.contains(['<', '*', '{', '(', '$']) && !w.starts_with("out/") && !w.starts_with("target/"))
+        .filter(|w| {
+            !w.contains(['<', '*', '{', '(', '$']) && !w.starts_with("out/") && !w.starts_with("target/")
+        })
         .collect()
 }
 
@@ -31,7 +33,8 @@ fn scenes_in_assets_load() {
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        let scene = polyptych::load::load(&path, &polyptych::load::LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let scene = polyptych::load::load(&path, &polyptych::load::LoadOptions::default())
+            .unwrap_or_else(|e| panic!("{e}"));
         assert!(!scene.objects.is_empty());
         count += 1;
     }

@@ -33,8 +33,10 @@ fn structural_defects_are_caught() {
         edit(&mut changed);
         shown(&changed)
     };
-    let hide = |name: &'static str| move |s: &mut Scene| {
-        s.objects.iter_mut().filter(|o| o.name == name).for_each(|o| o.visible = false);
+    let hide = |name: &'static str| {
+        move |s: &mut Scene| {
+            s.objects.iter_mut().filter(|o| o.name == name).for_each(|o| o.visible = false);
+        }
     };
     let pixels = |edit: &dyn Fn(&mut Vec<[f32; 3]>)| {
         let mut changed = reference.clone();
@@ -45,20 +47,32 @@ fn structural_defects_are_caught() {
         ("a small object is missing", with(&hide("ball"))),
         ("no shadows", with(&|s| s.lights[0].casts_shadow = false)),
         ("light a tenth too bright", with(&|s| s.lights[0].intensity *= 1.1)),
-        ("a tile was never drawn", pixels(&|p| {
-            (0..32 * 32).for_each(|i| p[(128 + i / 32) * SIZE + 64 + i % 32] = [0.0; 3]);
-        })),
-        ("sixty cracks", pixels(&|p| {
-            (0..60).for_each(|i| p[(i * 37 % SIZE) * SIZE + i * 101 % SIZE] = [1.0; 3]);
-        })),
+        (
+            "a tile was never drawn",
+            pixels(&|p| {
+                (0..32 * 32).for_each(|i| p[(128 + i / 32) * SIZE + 64 + i % 32] = [0.0; 3]);
+            }),
+        ),
+        (
+            "sixty cracks",
+            pixels(&|p| {
+                (0..60).for_each(|i| p[(i * 37 % SIZE) * SIZE + i * 101 % SIZE] = [1.0; 3]);
+            }),
+        ),
         ("red and blue swapped", pixels(&|p| p.iter_mut().for_each(|c| c.swap(0, 2)))),
-        ("shifted by four pixels", pixels(&|p| {
-            let old = p.clone();
-            (0..p.len()).for_each(|i| p[i] = old[i - i % SIZE + (i % SIZE + 4).min(SIZE - 1)]);
-        })),
-        ("not encoded for the display", pixels(&|p| {
-            p.iter_mut().for_each(|c| *c = c.map(polyptych::shade::linear_from_srgb));
-        })),
+        (
+            "shifted by four pixels",
+            pixels(&|p| {
+                let old = p.clone();
+                (0..p.len()).for_each(|i| p[i] = old[i - i % SIZE + (i % SIZE + 4).min(SIZE - 1)]);
+            }),
+        ),
+        (
+            "not encoded for the display",
+            pixels(&|p| {
+                p.iter_mut().for_each(|c| *c = c.map(polyptych::shade::linear_from_srgb));
+            }),
+        ),
     ];
     for (defect, picture) in &defects {
         assert!(!passes(picture, &reference), "{defect} passed the gate");

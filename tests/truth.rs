@@ -44,17 +44,31 @@ fn conversions_agree_with_closed_forms_within_their_bounds() {
             let detail = Detail { tolerance: 0.004, max_resolution: 256 };
             let mesh = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
             let error = (mesh.mesh.volume() - volume).abs();
-            assert!(error <= area * mesh.bound + 1e-5, "{primitive:?}: mesh off by {error}, bound {}", mesh.bound);
+            assert!(
+                error <= area * mesh.bound + 1e-5,
+                "{primitive:?}: mesh off by {error}, bound {}",
+                mesh.bound
+            );
 
             let voxels = converter.voxels(&scene, &object, Detail { max_resolution: 128, ..detail }).unwrap();
             let cell = voxels.object_from_voxels.matrix3.determinant();
             let error = (voxels.voxels.filled() as f64 * cell - volume).abs();
-            assert!(error <= area * voxels.bound, "{primitive:?}: voxels off by {error}, bound {}", voxels.bound);
+            assert!(
+                error <= area * voxels.bound,
+                "{primitive:?}: voxels off by {error}, bound {}",
+                voxels.bound
+            );
 
-            let field = converter.distance(&scene, &object, Detail { max_resolution: 64, ..detail }, &OneThread).unwrap();
+            let field = converter
+                .distance(&scene, &object, Detail { max_resolution: 64, ..detail }, &OneThread)
+                .unwrap();
             let inside = field.distances.iter().filter(|d| **d >= 0.0).count() as f64 * field.step.powi(3);
             let error = (inside - volume).abs();
-            assert!(error <= area * field.bound, "{primitive:?}: distances off by {error}, bound {}", field.bound);
+            assert!(
+                error <= area * field.bound,
+                "{primitive:?}: distances off by {error}, bound {}",
+                field.bound
+            );
         }
     }
 }
@@ -76,7 +90,8 @@ fn volumes_of_the_truth_set_have_their_surface_at_the_level() {
         let mut scene = (*model(&folder.join("volume/truth").join(file))).clone();
         let Shape::Volume(field) = &*scene.objects[0].shape else { panic!("{file} is a volume") };
         let mut field = field.clone();
-        let point = |value: f32, opacity: f32| polyptych::scene::TransferPoint { value, color: Vec3::ONE, opacity };
+        let point =
+            |value: f32, opacity: f32| polyptych::scene::TransferPoint { value, color: Vec3::ONE, opacity };
         field.transfer.points = vec![point(127.0, 0.0), point(129.0, 1.0)];
         scene.objects[0].shape = std::sync::Arc::new(Shape::Volume(field));
         let detail = Detail { tolerance: 0.01, max_resolution: 128 };

@@ -1,7 +1,9 @@
 //! What do scene and drawing options mean?
 
 use super::Failure;
-use super::arguments::{DrawArguments, ProjectionName, Quality, ReadingArguments, SceneArguments, ViewArguments};
+use super::arguments::{
+    DrawArguments, ProjectionName, Quality, ReadingArguments, SceneArguments, ViewArguments,
+};
 use glam::DVec3;
 use polyptych::camera::{Camera, Projection};
 use polyptych::load::{LoadOptions, RawVolume, load};
@@ -28,7 +30,9 @@ pub(super) fn named_scene(name: &str, reading: &ReadingArguments) -> Result<Arc<
     let volume = reading
         .volume
         .as_deref()
-        .map(|text| text.parse::<RawVolume>().map_err(|e| Failure::wrong_use(format!("--volume {text}: {e}"))))
+        .map(|text| {
+            text.parse::<RawVolume>().map_err(|e| Failure::wrong_use(format!("--volume {text}: {e}")))
+        })
         .transpose()?;
     let options = LoadOptions { volume, height_map: reading.height_map, ..LoadOptions::default() };
     load(Path::new(name), &options).map(Arc::new).map_err(Failure::input)

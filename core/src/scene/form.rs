@@ -259,7 +259,11 @@ impl Form {
                 base: boxed(base),
                 terms: terms
                     .iter()
-                    .map(|t| Perturbation { function: t.function.lowered(), weight: t.weight, power: t.power })
+                    .map(|t| Perturbation {
+                        function: t.function.lowered(),
+                        weight: t.weight,
+                        power: t.power,
+                    })
                     .collect(),
             },
             Self::Union(parts) => Self::Union(all(parts)),

@@ -1,6 +1,6 @@
 //! What does the reference draw? Writes color, normal, distance and id of a scene with every shape as PNGs.
 //!
-//! `cargo run -p polyptych-reference --example preview -- FOLDER [WIDTH [SAMPLES]]`
+//! `cargo run -p polyptych-reference --example reference_preview -- FOLDER [WIDTH [SAMPLES]]`
 
 use glam::{DAffine3, DQuat, DVec2, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};

@@ -1,6 +1,6 @@
 //! What does the rasterizer draw? Writes the channels of a small scene, or of a model, as PNGs.
 //!
-//! `cargo run -p polyptych-raster --example preview -- FOLDER [WIDTH [MODEL.obj]]`
+//! `cargo run -p polyptych-raster --example raster_preview -- FOLDER [WIDTH [MODEL.obj]]`
 
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3};
 use polyptych_core::camera::{Camera, Projection};

@@ -1,6 +1,6 @@
 //! What does the voxel back end draw? Writes color, normals and distances of a generated landscape as PNG.
 //!
-//! `cargo run -p polyptych-voxel --example preview -- FOLDER`
+//! `cargo run -p polyptych-voxel --example voxel_preview -- FOLDER`
 
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};

@@ -1,0 +1,198 @@
+//! Does the command keep its contract: words, fields, exit codes, refusals?
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn polyptych(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_polyptych")).args(arguments).output().expect("the command starts")
+}
+
+/// Makes an empty folder for a test.
+fn folder(name: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("polyptych-cli-{name}-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("a temporary folder");
+    path
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+fn json(output: &Output) -> Value {
+    let printed = String::from_utf8_lossy(&output.stdout);
+    serde_json::from_str(&printed)
+        .unwrap_or_else(|e| panic!("{e}: {printed}{}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// Asserts that a value has all of these fields.
+fn assert_fields(value: &Value, fields: &[&str]) {
+    for field in fields {
+        assert!(value.get(field).is_some(), "no `{field}` in {value}");
+    }
+}
+
+#[test]
+fn compare_writes_the_sheet_the_page_and_the_numbers() {
+    let out = folder("compare");
+    let done = polyptych(&["compare", "builtin:polyhedra", "--size", "96x54", "-o", text(&out)]);
+    assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+    let table = String::from_utf8_lossy(&done.stdout);
+    for row in ["reference", "raster", "voxel", "freeform", "stylized"] {
+        assert!(table.lines().any(|l| l.starts_with(row)), "no row {row} in\n{table}");
+        assert!(out.join(format!("{row}.png")).exists());
+    }
+    assert!(image::open(out.join("sheet.png")).is_ok());
+    let page = std::fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(!page.contains("/*DATA*/null") && !page.contains("http://") && !page.contains("https://"));
+    let numbers: Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("compare.json")).unwrap()).unwrap();
+    assert_fields(&numbers, &["scene", "width", "height", "reference", "panels"]);
+    let raster = &numbers["panels"][0];
+    assert_fields(
+        raster,
+        &["backend", "settings", "prepare_ms", "frame_ms", "bytes", "objects", "errors", "split", "gate"],
+    );
+    assert_fields(&raster["objects"], &["exact", "converted", "approximated", "skipped"]);
+    let errors = &raster["errors"];
+    assert_fields(
+        errors,
+        &["distance", "normal_deg", "id_agreement", "silhouette_iou", "shadow_agreement", "color"],
+    );
+    assert_fields(&errors["distance"], &["mean", "p99", "max", "relative"]);
+    let color = ["rmse", "psnr", "ssim", "flip", "bias", "worst_tile", "outliers", "largest_blob"];
+    assert_fields(&errors["color"], &color);
+    assert_fields(&raster["gate"], &["passed", "failed"]);
+    let left: Vec<_> =
+        std::fs::read_dir(&out).unwrap().filter_map(Result::ok).map(|e| e.file_name()).collect();
+    assert!(left.iter().all(|name| !name.to_string_lossy().ends_with(".part")), "{left:?}");
+}
+
+#[test]
+fn a_gate_that_does_not_hold_is_exit_code_four() {
+    let out = folder("gate");
+    // Sixteen samples along a body are too coarse for a gate.
+    let coarse = ["--set", "voxel.detail.resolution=16"];
+    let base =
+        ["compare", "builtin:polyhedra", "-b", "voxel", "--size", "160x90", "--gate", "-o", text(&out)];
+    let failed = polyptych(&[&base[..], &coarse[..]].concat());
+    assert_eq!(failed.status.code(), Some(4));
+    assert!(String::from_utf8_lossy(&failed.stderr).contains("gate: voxel failed: "));
+}
+
+#[test]
+fn bench_plan_backends_and_render_print_their_fields() {
+    let bench = json(&polyptych(&[
+        "bench",
+        "builtin:polyhedra",
+        "-b",
+        "raster",
+        "--size",
+        "64x36",
+        "--frames",
+        "3",
+        "--json",
+    ]));
+    let fields = [
+        "backend",
+        "scene",
+        "width",
+        "height",
+        "threads",
+        "prepare_ms",
+        "frames",
+        "ms_median",
+        "ms_min",
+        "ms_p95",
+        "bytes",
+        "settings",
+    ];
+    assert_fields(&bench[0], &fields);
+    assert_eq!(bench[0]["frames"], 3);
+
+    let plan = json(&polyptych(&["plan", "builtin:quadrics", "--json"]));
+    assert_eq!(plan.as_array().map(Vec::len), Some(5));
+    assert_fields(&plan[0], &["backend", "objects", "passes", "bytes", "estimated_ms"]);
+    assert_fields(&plan[1]["objects"][0], &["name", "shape", "decision", "builds", "bytes", "bound", "why"]);
+    assert_fields(&plan[1]["passes"][0], &["name", "needed", "why"]);
+
+    let backends = json(&polyptych(&["backends", "--json"]));
+    assert_eq!(backends.as_array().map(Vec::len), Some(5));
+    assert_fields(
+        &backends[1],
+        &["id", "name", "version", "origin", "status", "shapes", "channels", "parameters"],
+    );
+    let parameter =
+        ["name", "type", "default", "min", "max", "choices", "unit", "help", "tag", "quality_axis"];
+    assert_fields(&backends[1]["parameters"][0], &parameter);
+    assert_eq!(backends[1]["origin"], "built-in");
+
+    let file = folder("render").join("picture.png");
+    let base = [
+        "render",
+        "builtin:quadrics",
+        "-b",
+        "freeform",
+        "--size",
+        "48x32",
+        "--view",
+        "-30,20",
+        "--json",
+        "-o",
+    ];
+    let render = json(&polyptych(&[&base[..], &[text(&file)]].concat()));
+    assert_fields(
+        &render,
+        &["backend", "width", "height", "prepare_ms", "frame_ms", "bytes", "objects", "out"],
+    );
+    assert_eq!(image::open(file).unwrap().to_rgb8().dimensions(), (48, 32));
+}
+
+#[test]
+fn convert_writes_models_that_load_again() {
+    let out = folder("convert");
+    for (name, resolution) in [("a.obj", "64"), ("a.glb", "64"), ("a.vox", "48"), ("a.nrrd", "32")] {
+        let file = out.join(name);
+        let done = polyptych(&["convert", "builtin:polyhedra", text(&file), "--resolution", resolution]);
+        assert_eq!(done.status.code(), Some(0), "{name}: {}", String::from_utf8_lossy(&done.stderr));
+        assert!(String::from_utf8_lossy(&done.stdout).contains("at most"), "the bound is stated");
+        let scene = polyptych::load::load(&file, &polyptych::load::LoadOptions::default()).unwrap();
+        let size = scene.bounds().size();
+        assert!(size.min_element() > 0.0 && size.is_finite(), "{name}: {size}");
+    }
+}
+
+#[test]
+fn refusals_are_one_line_with_the_code_of_their_kind() {
+    let cases: [(&[&str], i32, &str); 10] = [
+        (&["render", "no/such/file.obj", "-o", "x.png"], 3, "no/such/file.obj"),
+        (&["render", "builtin:nothing", "-o", "x.png"], 3, "atelier, polyhedra"),
+        (&["render", "Cargo.toml", "-o", "x.png"], 3, "Cargo.toml"),
+        (&["render", "-b", "rastre", "-o", "x.png"], 2, "the nearest is `raster`"),
+        (&["render", "-b", "raster,voxel", "-o", "x.png"], 2, "use `compare`"),
+        (&["render", "--set", "shadow.mapsize=3", "-o", "x.png"], 2, "the nearest is `shadow.map_size`"),
+        (&["render", "--set", "raster.shadow.map_size=3", "-o", "x.png"], 2, "a whole number from"),
+        (&["render", "--camera", "back", "-o", "x.png"], 2, "front, bird, close"),
+        (&["render", "--tolerance", "0", "-o", "x.png"], 2, "positive"),
+        (
+            &["render", "builtin:polyhedra", "--size", "8x8", "-o", "x.gifx"],
+            1,
+            "use .png, .jpg, .exr or .pfm",
+        ),
+    ];
+    for (arguments, code, hint) in cases {
+        let refused = polyptych(arguments);
+        let message = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(code), "{arguments:?}: {message}");
+        assert!(message.contains(hint), "{arguments:?}: {message}");
+        assert!(
+            message.starts_with("error: ") && message.trim_end().lines().count() == 1,
+            "{arguments:?}: {message}"
+        );
+        assert!(refused.stdout.is_empty());
+    }
+    for wrong in [&["render", "--size", "0x5", "-o", "x.png"][..], &["paint"], &["bench", "--frames", "0"]] {
+        assert_eq!(polyptych(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+}
