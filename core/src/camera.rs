@@ -158,7 +158,12 @@ impl Camera {
     /// Prepares the rays of a picture of that size.
     #[must_use]
     pub fn view(&self, width: u32, height: u32) -> View<'_> {
-        View { camera: self, width: f64::from(width.max(1)), height: f64::from(height.max(1)) }
+        let half = match self.projection {
+            Projection::Perspective { fov_y } | Projection::Cylindrical { fov_y, .. } => (fov_y * 0.5).tan(),
+            Projection::Orthographic { height } => height * 0.5,
+            Projection::Fisheye { .. } | Projection::Warp(_) => 0.0,
+        };
+        View { camera: self, width: f64::from(width.max(1)), height: f64::from(height.max(1)), half }
     }
 }
 
@@ -168,6 +173,9 @@ pub struct View<'a> {
     camera: &'a Camera,
     width: f64,
     height: f64,
+    /// Half of the picture's height on a plane at distance 1, where the projection has one: a tangent that need
+    /// not be taken for each ray.
+    half: f64,
 }
 
 impl View<'_> {
@@ -178,13 +186,10 @@ impl View<'_> {
         let camera = self.camera;
         let (u, v) = (x * 2.0 / self.width - 1.0, 1.0 - y * 2.0 / self.height);
         let aspect = self.width / self.height;
+        let half = self.half;
         let local = match &camera.projection {
-            Projection::Perspective { fov_y } => {
-                let half = (fov_y * 0.5).tan();
-                DVec3::new(u * half * aspect, v * half, -1.0)
-            }
-            Projection::Orthographic { height } => {
-                let half = height * 0.5;
+            Projection::Perspective { .. } => DVec3::new(u * half * aspect, v * half, -1.0),
+            Projection::Orthographic { .. } => {
                 let shift = camera.world_from_camera * DVec3::new(u * half * aspect, v * half, 0.0);
                 return Some(Ray { origin: camera.eye + shift, direction: camera.forward() });
             }
@@ -199,9 +204,9 @@ impl View<'_> {
                 let side = if radius > 0.0 { angle.sin() / radius } else { 0.0 };
                 DVec3::new(place.x * side, place.y * side, -angle.cos())
             }
-            Projection::Cylindrical { fov_x, fov_y } => {
+            Projection::Cylindrical { fov_x, .. } => {
                 let angle = u * fov_x * 0.5;
-                DVec3::new(angle.sin(), v * (fov_y * 0.5).tan(), -angle.cos())
+                DVec3::new(angle.sin(), v * half, -angle.cos())
             }
             Projection::Warp(table) => table.direction(DVec2::new(x / self.width, y / self.height))?,
         };

@@ -5,8 +5,8 @@ use polyptych_core::math::{Aabb, Ray};
 
 /// Boxes in a leaf: grids are dear to enter, boxes cheap to test.
 const LEAF: usize = 2;
-/// Deepest path: halving by count leaves at most 32 levels over 2^32 boxes.
-const DEEPEST: usize = 64;
+/// Longest path: 2^32 boxes halve 32 times.
+const DEEPEST: usize = 32;
 
 /// A binary tree of boxes, halved by count along the longest axis.
 #[derive(Debug, Default)]
@@ -91,9 +91,11 @@ impl Tree {
     pub(crate) fn visit(&self, ray: &WorldRay, before: f64, visit: &mut impl FnMut(usize, f64) -> f64) {
         let Some(root) = self.nodes.first() else { return };
         let mut before = before;
-        let mut stack = [(0u32, 0.0_f64); DEEPEST];
-        let mut len = 0;
         let mut current = (0u32, ray.enters(&root.bounds, before));
+        if current.1 == f64::INFINITY {
+            return;
+        }
+        let (mut waiting, mut waiting_from, mut len) = ([0u32; DEEPEST], [0.0_f64; DEEPEST], 0);
         loop {
             if current.1 <= before && current.1 < f64::INFINITY {
                 let node = &self.nodes[current.0 as usize];
@@ -101,7 +103,7 @@ impl Tree {
                     let enter = |i: u32| (i, ray.enters(&self.nodes[i as usize].bounds, before));
                     let (left, right) = (enter(node.first), enter(node.first + 1));
                     let (near, far) = if right.1 < left.1 { (right, left) } else { (left, right) };
-                    stack[len] = far;
+                    (waiting[len], waiting_from[len]) = far;
                     len += 1;
                     current = near;
                     continue;
@@ -114,7 +116,7 @@ impl Tree {
                 return;
             }
             len -= 1;
-            current = stack[len];
+            current = (waiting[len], waiting_from[len]);
         }
     }
 

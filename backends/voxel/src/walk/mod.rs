@@ -98,11 +98,19 @@ impl GridRay {
     }
 
     /// Returns the cell along an axis, between two, after all planes before a moment were crossed.
-    #[inline]
+    #[inline(always)]
     fn cell_at(&self, axis: usize, from: i32, to: i32, moment: Moment) -> i32 {
         let place = self.origin[axis] + self.direction[axis] * moment.t;
-        let mut cell = nearest_whole(place - 0.5).clamp(from, to);
-        // The rounded place may be a cell off: the planes decide.
+        let cell = nearest_whole(place - 0.5).clamp(from, to);
+        let is_reached = cell == from || moment.is_after(self.plane(axis, cell), axis);
+        let is_left = cell < to && moment.is_after(self.plane(axis, cell + 1), axis);
+        if is_reached && !is_left { cell } else { self.correct(axis, cell, from, to, moment) }
+    }
+
+    /// Moves a cell to where the planes say: the rounded place may be a cell off, or far off for huge numbers.
+    #[cold]
+    #[inline(never)]
+    fn correct(&self, axis: usize, mut cell: i32, from: i32, to: i32, moment: Moment) -> i32 {
         while cell < to && moment.is_after(self.plane(axis, cell + 1), axis) {
             cell += 1;
         }
@@ -215,7 +223,7 @@ impl Walk {
 
     /// Leaves an aligned block of `2^exponent` cells around the cell, in which nothing is of interest. False where
     /// the grid or the ray ends; the walk is then over.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn leave(&mut self, exponent: u32) -> bool {
         let mask = (1 << exponent) - 1;
         let exit = |a: usize| self.ray.plane(a, (self.cell[a] | mask) + 1);
