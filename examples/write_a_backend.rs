@@ -90,7 +90,6 @@ impl Renderer for Boxes {
     }
 }
 
-
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut registry = Registry::builtin();
     registry.add(Arc::new(BoxesFactory), Origin::BuiltIn);

@@ -203,9 +203,10 @@ pub(super) fn closest_weights([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
     if sum > 0.0 { DVec3::new(va, vb, vc) / sum } else { DVec3::X }
 }
 
-/// Tells whether more than one in a hundred edges belongs to one triangle only, vertices welded by position.
+/// Tells whether more than one in a hundred edges belongs to one triangle only, vertices welded to a millionth of the size.
 fn is_open(mesh: &Mesh) -> bool {
-    let key = |i: u32| (mesh.positions[i as usize] + 0.0).to_array().map(f32::to_bits);
+    let grid = mesh.bounds().radius().max(1e-30) * 1e-6;
+    let key = |i: u32| (mesh.positions[i as usize].as_dvec3() / grid).round().to_array().map(|c| c as i64);
     let mut edges: HashMap<_, u32> = HashMap::with_capacity(mesh.triangles.len() * 2);
     for t in &mesh.triangles {
         for k in 0..3 {

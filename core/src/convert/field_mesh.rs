@@ -121,26 +121,25 @@ pub(super) fn count_surface_cells(volume: &Volume) -> usize {
 fn surface_cells(volume: &Volume) -> Vec<[u32; 3]> {
     let level = volume.transfer.surface_value();
     let [nx, ny, nz] = volume.size().map(|s| s as usize);
-    // NaN is not inside.
-    let inside: Vec<bool> = (0..nx * ny * nz).map(|i| volume.samples().get(i) >= level).collect();
-    let at = |x: usize, y: usize, z: usize| {
-        x > 0
-            && y > 0
-            && z > 0
-            && x <= nx
-            && y <= ny
-            && z <= nz
-            && inside[((z - 1) * ny + y - 1) * nx + x - 1]
+    // A sample on the level itself may come out on either side when it is interpolated: it counts as both.
+    let range = volume.range();
+    let slack = (range[1] - range[0]).abs() * 1e-6;
+    let at = |x: usize, y: usize, z: usize| -> (bool, bool) {
+        if x == 0 || y == 0 || z == 0 || x > nx || y > ny || z > nz {
+            return (false, true);
+        }
+        let value = volume.samples().get(((z - 1) * ny + y - 1) * nx + x - 1);
+        // What is not a number is outside.
+        (value >= level - slack, !(value > level + slack))
     };
     let mut cells = Vec::new();
     for z in 0..=nz {
         for y in 0..=ny {
             for x in 0..=nx {
-                let mut count = 0;
-                for corner in 0..8 {
-                    count += usize::from(at(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)));
-                }
-                if count > 0 && (count < 8 || volume.shell.is_some()) {
+                let corners = (0..8).map(|c| at(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)));
+                let (inside, outside) =
+                    corners.fold((false, false), |all, one| (all.0 | one.0, all.1 | one.1));
+                if inside && (outside || volume.shell.is_some()) {
                     cells.push([x as u32, y as u32, z as u32]);
                 }
             }

@@ -27,7 +27,9 @@ pub(super) fn tessellate(primitive: &Primitive, tolerance: f64) -> (Mesh, f64) {
             let profile: Vec<_> = (0..=rings)
                 .map(|i| {
                     let angle = PI * f64::from(i) / f64::from(rings);
-                    let normal = DVec2::new(angle.sin(), angle.cos());
+                    // The poles lie exactly on the axis, so that the sphere is closed.
+                    let pole = i == 0 || i == rings;
+                    let normal = DVec2::new(if pole { 0.0 } else { angle.sin() }, angle.cos());
                     ProfilePoint { place: normal * radius, normal, v: angle / PI }
                 })
                 .collect();
