@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let look = |projection| Camera::look_at(eye, DVec3::new(0.0, 0.6, 0.0), DVec3::Y, projection);
     draw(&scene, look(perspective), width, folder, "perspective")?;
     draw(&scene, look(Projection::Orthographic { height: 6.0 }), width / 2, folder, "orthographic")?;
-    let inside = |projection| Camera { eye: DVec3::new(0.3, 0.9, 2.2), ..look(projection) };
+    let inside = |projection| Camera { eye: DVec3::new(-0.4, 1.2, 4.2), ..look(projection) };
     draw(&scene, inside(Projection::Fisheye { fov: 3.6 }), width / 2, folder, "fisheye")?;
     let around = Projection::Cylindrical { fov_x: 6.2, fov_y: 1.4 };
     draw(&scene, inside(around), width / 2, folder, "cylindrical")

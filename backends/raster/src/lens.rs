@@ -163,6 +163,7 @@ impl Lens {
     }
 
     /// Returns column, row and distance ahead of a point relative to the origin.
+    #[inline]
     pub(crate) fn place(&self, p: DVec3) -> (f64, f64, f64) {
         let ahead = self.ahead.at(p);
         let share = match self.rays {
@@ -173,10 +174,20 @@ impl Lens {
     }
 
     /// Returns the ray through a place of the picture.
+    #[inline]
     pub(crate) fn ray(&self, x: f64, y: f64) -> PixelRay {
-        let direction = self.direction.at(x, y);
+        let (start, direction) = self.line(x, y);
         let length = direction.length();
-        PixelRay { start: self.start.at(x, y), direction, unit: direction / length, length }
+        PixelRay { start, direction, unit: direction * (1.0 / length), length }
+    }
+
+    /// Returns start and direction (not of unit length) of the ray through a place of the picture.
+    #[inline]
+    pub(crate) fn line(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+        match self.rays {
+            Rays::Central => (DVec3::ZERO, self.direction.at(x, y)),
+            Rays::Parallel => (self.start.at(x, y), self.direction.base),
+        }
     }
 
     /// Returns how the point at `t` along a ray moves over one pixel to the right and one down, before it is put

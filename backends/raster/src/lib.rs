@@ -26,6 +26,7 @@
 //! **Color** is that of the pixel's center whatever number of samples is asked for, and coverage is 0 or 1.
 
 mod bin;
+mod casters;
 mod clip;
 mod decide;
 mod faces;

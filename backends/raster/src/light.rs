@@ -58,6 +58,7 @@ impl Lamp {
     }
 
     /// Returns the light that would arrive at a point of the world if nothing were in between.
+    #[inline]
     fn arriving(&self, point: DVec3) -> Option<Arriving> {
         match self.light.kind {
             LightKind::Directional { .. } => self.steady,
@@ -91,6 +92,7 @@ pub(crate) struct Illumination<'a> {
 
 impl Illumination<'_> {
     /// Lights a point; `origin` is that of the lens, `to_eye` has unit length.
+    #[inline]
     pub(crate) fn light(&self, point: &Point<'_>, origin: DVec3, to_eye: DVec3, wants: Wants) -> Lit {
         let environment = &self.scene.environment;
         let surface = Surface {

@@ -1,7 +1,7 @@
 //! What is drawn: triangle meshes at their places, given or converted.
 
 use crate::setup::Sides;
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Mat3};
 use polyptych_core::convert::MeshModel;
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{AlphaMode, Material, Mesh, Object, Scene, Shape};
@@ -30,12 +30,16 @@ pub(crate) struct Part {
     pub(crate) object: usize,
     pub(crate) source: Source,
     pub(crate) world_from_object: DAffine3,
-    /// Turns normals of object space into such of world space.
-    pub(crate) world_from_normal: DMat3,
+    /// Turns vectors of world space into such of object space.
+    pub(crate) object_from_vector: DMat3,
+    /// Turns normals of object space into such of world space, up to a factor that keeps `f32` in range.
+    pub(crate) world_from_normal: Mat3,
     /// Whether the transform turns the winding over.
     pub(crate) mirrored: bool,
     pub(crate) first_triangle: u32,
     pub(crate) first_vertex: usize,
+    /// In the world.
+    pub(crate) bounds: Aabb,
     /// How each slot looks to the camera and to lights.
     classes: Vec<[Class; 2]>,
     /// Whether light can be blocked on its way to it.
@@ -114,7 +118,9 @@ impl Model {
         };
         let vertices = mesh.positions.len();
         let own_bounds = mesh.bounds();
-        let bounds = own_bounds.transformed(&object.world_from_object);
+        // Of the corners, not of the box: that of a turned box would be larger.
+        let corners = mesh.triangles.iter().flatten().map(|&i| mesh.positions[i as usize].as_dvec3());
+        let bounds = Aabb::of_points(corners.map(|p| object.world_from_object.transform_point3(p)));
         let matrix = object.world_from_object.matrix3;
         let scale = matrix.x_axis.length().max(matrix.y_axis.length()).max(matrix.z_axis.length());
         if !own_bounds.is_empty() {
@@ -125,10 +131,12 @@ impl Model {
         self.parts.push(Part {
             object: index,
             world_from_object: object.world_from_object,
-            world_from_normal: matrix.inverse().transpose(),
+            object_from_vector: matrix.inverse(),
+            world_from_normal: normal_matrix(&matrix),
             mirrored: matrix.determinant() < 0.0,
             first_triangle: self.triangles,
             first_vertex: self.vertices,
+            bounds,
             classes: classes(scene, object),
             takes_shadow: !matches!(*object.shape, Shape::Volume(_)),
             one_sided_layers: matches!(*object.shape, Shape::Voxels(_)),
@@ -156,6 +164,11 @@ impl Part {
         self.classes.get(slot).unwrap_or(&self.classes[0])[role as usize]
     }
 
+    /// Lists how each slot takes part in the passes.
+    pub(crate) fn slots(&self) -> impl Iterator<Item = [Class; 2]> {
+        self.classes.iter().copied()
+    }
+
     /// Returns the sides to draw when those that look away are to be left out.
     pub(crate) fn sides(&self, culls: bool) -> Sides {
         match (culls, self.mirrored) {
@@ -167,8 +180,11 @@ impl Part {
 
     /// Returns the corners of a triangle in world space, relative to an origin.
     pub(crate) fn corners(&self, triangle: usize, origin: DVec3) -> [DVec3; 3] {
+        let (mesh, matrix) = (self.mesh(), &self.world_from_object.matrix3);
         let offset = self.world_from_object.translation - origin;
-        self.mesh().corners(triangle).map(|p| self.world_from_object.matrix3 * p.as_dvec3() + offset)
+        let [a, b, c] = mesh.triangles[triangle];
+        let place = |i: u32| *matrix * mesh.positions[i as usize].as_dvec3() + offset;
+        [place(a), place(b), place(c)]
     }
 
     /// Tells whether two parts throw the same shadows.
@@ -178,6 +194,13 @@ impl Part {
             && self.first_triangle == other.first_triangle
             && self.classes == other.classes
     }
+}
+
+fn normal_matrix(world_from_object: &DMat3) -> Mat3 {
+    let inverse = world_from_object.inverse().transpose();
+    let columns = [inverse.x_axis, inverse.y_axis, inverse.z_axis];
+    let largest = columns.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
+    (inverse * (1.0 / largest)).as_mat3()
 }
 
 fn classes(scene: &Scene, object: &Object) -> Vec<[Class; 2]> {

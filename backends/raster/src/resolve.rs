@@ -5,7 +5,6 @@
 
 use crate::lens::{Lens, PixelRay};
 use crate::model::{Model, Part};
-use crate::tile::NO_TRIANGLE;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use polyptych_core::scene::{Mapping, Material, Mesh, Scene, Texture};
 
@@ -18,15 +17,15 @@ pub(crate) struct Resolver<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) model: &'a Model,
     pub(crate) lens: &'a Lens,
-    face: Face,
+    face: Option<Face<'a>>,
 }
 
 /// A triangle set up to be met by rays, relative to the lens's origin.
-#[derive(Clone, Copy)]
-struct Face {
+struct Face<'a> {
     id: u32,
-    part: usize,
-    triangle: usize,
+    part: &'a Part,
+    mesh: &'a Mesh,
+    material: &'a Material,
     corners: [usize; 3],
     origin: DVec3,
     edges: [DVec3; 2],
@@ -68,54 +67,45 @@ pub(crate) enum Ask {
 
 impl<'a> Resolver<'a> {
     pub(crate) fn new(scene: &'a Scene, model: &'a Model, lens: &'a Lens) -> Self {
-        let face = Face {
-            id: NO_TRIANGLE,
-            part: 0,
-            triangle: 0,
-            corners: [0; 3],
-            origin: DVec3::ZERO,
-            edges: [DVec3::ZERO; 2],
-            normal: DVec3::ZERO,
-            outward: DVec3::ZERO,
-            height: 0.0,
-            weights: [DVec3::ZERO; 2],
-        };
-        Self { scene, model, lens, face }
+        Self { scene, model, lens, face: None }
     }
 
     /// Finds the point of a triangle that a ray meets.
+    #[inline]
     pub(crate) fn resolve(&mut self, id: u32, ray: &PixelRay, ask: Ask) -> Point<'a> {
-        if self.face.id != id {
-            self.face = Face::new(self.model, self.lens.origin, id);
+        if self.face.as_ref().is_none_or(|face| face.id != id) {
+            self.face = Some(Face::new(self.scene, self.model, self.lens.origin, id));
         }
-        let face = &self.face;
-        let part = &self.model.parts[face.part];
-        let mesh = part.mesh();
+        let Some(face) = &self.face else { unreachable!("the face was just set up") };
         let met = face.meet(ray);
-        let side = if face.outward.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
-        let true_normal = face.outward * side;
-        let normal = face.shading_normal(part, mesh, met.weights).unwrap_or(face.outward) * side;
-        let material = self.scene.material(&self.scene.objects[part.object], mesh.slot(face.triangle));
+        let away = face.outward.dot(ray.direction) > 0.0;
+        let true_normal = if away { -face.outward } else { face.outward };
+        let smooth = face.shading_normal(&met.weights);
+        let normal = if away { -smooth } else { smooth };
         let (color, opacity) = match ask {
             Ask::Geometry => (Vec3::ZERO, 1.0),
-            Ask::Color => self.color(part, mesh, material, &met, ray),
+            Ask::Color if face.material.texture.is_none() && face.mesh.colors.is_empty() => {
+                let material = face.material;
+                (material.base_color, material.effective_opacity(material.opacity).min(1.0))
+            }
+            Ask::Color => self.color(face, &met, ray),
         };
         Point {
-            part,
-            material,
+            part: face.part,
+            material: face.material,
             triangle: id,
             place: met.inside,
             distance: met.t * ray.length,
             true_normal,
-            normal: normal.as_vec3(),
+            normal,
             color,
             opacity,
         }
     }
 
     /// Returns base color and effective opacity.
-    fn color(&self, part: &Part, mesh: &Mesh, material: &Material, met: &Met, ray: &PixelRay) -> (Vec3, f32) {
-        let face = &self.face;
+    fn color(&self, face: &Face<'_>, met: &Met, ray: &PixelRay) -> (Vec3, f32) {
+        let (mesh, material) = (face.mesh, face.material);
         let [a, b, c] = face.corners;
         let weights = met.weights;
         let texture = material.texture.and_then(|t| self.scene.textures.get(t));
@@ -129,7 +119,7 @@ impl<'a> Resolver<'a> {
                 let [p, q, r] = [a, b, c].map(|i| mesh.positions[i].as_dvec3());
                 let position = (p * weights[0] + q * weights[1] + r * weights[2]).as_vec3();
                 let normal = (q - p).cross(r - p).normalize_or_zero().as_vec3();
-                let lod = self.lod(part, mesh, material, texture, met, ray);
+                let lod = self.lod(face, texture, met, ray);
                 self.scene.base_color(material, uv.map(|v| v.to_array()), position, normal, lod)
             }
         };
@@ -144,16 +134,8 @@ impl<'a> Resolver<'a> {
 
     /// Returns the mip level at which a texel is as large as the pixel, from the exact change of the point over
     /// one pixel to the right and one down.
-    fn lod(
-        &self,
-        part: &Part,
-        mesh: &Mesh,
-        material: &Material,
-        texture: &Texture,
-        met: &Met,
-        ray: &PixelRay,
-    ) -> f32 {
-        let face = &self.face;
+    fn lod(&self, face: &Face<'_>, texture: &Texture, met: &Met, ray: &PixelRay) -> f32 {
+        let (mesh, material) = (face.mesh, face.material);
         let (right, down) = self.lens.change(met.t);
         let share = 1.0 / face.normal.dot(ray.direction);
         let moved = [right, down].map(|d| d - ray.direction * (face.normal.dot(d) * share));
@@ -169,7 +151,7 @@ impl<'a> Resolver<'a> {
             Mapping::Triplanar { scale } => scale,
         };
         // In object space lengths are those before the part's transform.
-        let back = part.world_from_normal.transpose();
+        let back = face.part.object_from_vector;
         let [x, y] = moved.map(|d| Vec2::new((back * d).length() as f32 * scale, 0.0));
         texture.lod(x, y)
     }
@@ -184,20 +166,24 @@ struct Met {
     inside: DVec3,
 }
 
-impl Face {
-    fn new(model: &Model, origin: DVec3, id: u32) -> Self {
+impl<'a> Face<'a> {
+    #[inline(never)]
+    fn new(scene: &'a Scene, model: &'a Model, origin: DVec3, id: u32) -> Self {
         let (index, triangle) = model.find(id);
         let part = &model.parts[index];
         let [a, b, c] = part.corners(triangle, origin);
         let edges = [b - a, c - a];
         let normal = edges[0].cross(edges[1]);
         let share = 1.0 / normal.length_squared();
+        let mesh = part.mesh();
+        let [i, j, k] = mesh.triangles[triangle];
         let turned = if part.mirrored { -normal } else { normal };
         Self {
             id,
-            part: index,
-            triangle,
-            corners: part.mesh().triangles[triangle].map(|i| i as usize),
+            part,
+            mesh,
+            material: scene.material(&scene.objects[part.object], mesh.slot(triangle)),
+            corners: [i as usize, j as usize, k as usize],
             origin: a,
             edges,
             normal,
@@ -207,6 +193,7 @@ impl Face {
         }
     }
 
+    #[inline]
     fn meet(&self, ray: &PixelRay) -> Met {
         let t = (self.height - self.normal.dot(ray.start)) / self.normal.dot(ray.direction);
         let r = ray.start + ray.direction * t - self.origin;
@@ -225,13 +212,18 @@ impl Face {
         Met { t, weights: held, inside }
     }
 
-    fn shading_normal(&self, part: &Part, mesh: &Mesh, weights: [f64; 3]) -> Option<DVec3> {
-        if mesh.normals.is_empty() {
-            return None;
+    /// Returns the interpolated normal, or the true one where the mesh has none.
+    #[inline]
+    fn shading_normal(&self, weights: &[f64; 3]) -> Vec3 {
+        let normals = &self.mesh.normals;
+        if normals.is_empty() {
+            return self.outward.as_vec3();
         }
-        let [a, b, c] = self.corners.map(|i| mesh.normals[i].as_dvec3());
-        let mixed = a * weights[0] + b * weights[1] + c * weights[2];
-        (part.world_from_normal * mixed).try_normalize()
+        let [a, b, c] = self.corners;
+        let mixed =
+            normals[a] * weights[0] as f32 + normals[b] * weights[1] as f32 + normals[c] * weights[2] as f32;
+        let turned = self.part.world_from_normal * mixed;
+        turned.try_normalize().unwrap_or_else(|| self.outward.as_vec3())
     }
 }
 

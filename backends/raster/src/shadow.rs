@@ -14,10 +14,11 @@
 //! Source of storing names instead of depths: J. C. Hourcade, A. Nicolas, *Algorithms for antialiased cast
 //! shadows*, Computers & Graphics 9(3), 1985; comparing planes instead of equal names is ours.
 
-use crate::bin::{Bins, Pass, Without};
+use crate::bin::{Bins, Pass};
+use crate::casters::Casters;
 use crate::lens::{Lens, Rays, cube_axes, cube_face};
-use crate::light::{Cell, Lamp};
-use crate::model::{Model, Part, Role};
+use crate::light::Lamp;
+use crate::model::{Class, Model, Role};
 use crate::resolve::{Ask, Resolver};
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileBuffer, TileGrid};
 use crate::transform::{ScreenVertex, transform};
@@ -117,27 +118,20 @@ impl Shadows {
         control: &Control<'_>,
     ) -> Result<Self, Cancelled> {
         let origin = model.bounds.center();
-        let mut shadows = Self {
-            origin,
-            maps: Vec::with_capacity(lamps.len()),
-            planes: planes(model, origin, control.threads),
-            tolerance: ON_PLANE * model.reach.max(model.bounds.radius()),
-        };
-        let bounds = Aabb::new(model.bounds.min - origin, model.bounds.max - origin);
+        let tolerance = ON_PLANE * model.reach.max(model.bounds.radius());
+        let casters = Casters::of(model, tolerance);
+        let planes = planes(model, origin, control.threads);
+        let mut shadows = Self { origin, maps: Vec::with_capacity(lamps.len()), planes, tolerance };
         for lamp in lamps {
             let mut map = Map::default();
+            let (bounds, left_out) = casters.of_light(model, &lamp.light.kind, lamp.cell);
             if lamp.light.casts_shadow && !bounds.is_empty() {
+                let bounds = Aabb::new(bounds.min - origin, bounds.max - origin);
                 for mut lens in lenses(&lamp.light.kind, sizes, &bounds, origin) {
                     control.check()?;
-                    let own = lamp.cell.map(OwnFaces);
                     lens.origin += origin;
-                    let pass = Pass {
-                        model,
-                        lens: &lens,
-                        role: Role::Light,
-                        culls_back: false,
-                        without: own.as_ref().map(|o| o as &dyn Without),
-                    };
+                    let role = Role::Light;
+                    let pass = Pass { model, lens: &lens, role, culls_back: false, without: Some(&left_out) };
                     transform(model, &lens, vertices, control.threads);
                     let grid = TileGrid::new(lens.width, lens.height);
                     bins.fill(&pass, vertices, &grid, control.threads);
@@ -158,6 +152,7 @@ impl Shadows {
     }
 
     /// Tells whether something stands between a point and a light.
+    #[inline]
     pub(crate) fn is_blocked(&self, scene: &Scene, model: &Model, lamp: usize, sight: &Sight) -> bool {
         let map = &self.maps[lamp];
         let face = match map.faces.len() {
@@ -174,11 +169,26 @@ impl Shadows {
         }
         // The texels whose centers are the corners of the square around the place.
         let (column, row) = ((x + 0.5) as i32 - 1, (y + 0.5) as i32 - 1);
+        let ids = face.square(column, row);
+        if ids.iter().all(|&id| id == NO_TRIANGLE || id == sight.triangle) {
+            return false;
+        }
+        self.is_blocked_by(scene, model, face, (column, row), &ids, sight)
+    }
+
+    /// Tells whether one of the triangles at four texels stands in between.
+    fn is_blocked_by(
+        &self,
+        scene: &Scene,
+        model: &Model,
+        face: &MapFace,
+        (column, row): (i32, i32),
+        ids: &[u32; 4],
+        sight: &Sight,
+    ) -> bool {
         let mut all_in_front = true;
         let (mut last, mut last_before) = (NO_TRIANGLE, false);
-        for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let (u, v) = (column + dx, row + dy);
-            let id = face.triangle(u, v);
+        for (i, &id) in ids.iter().enumerate() {
             if id == NO_TRIANGLE || id == sight.triangle {
                 all_in_front = false;
                 continue;
@@ -190,8 +200,8 @@ impl Shadows {
                     return true;
                 }
             }
-            all_in_front &=
-                last_before && self.is_above(face, id, (f64::from(u) + 0.5, f64::from(v) + 0.5), sight);
+            let texel = (f64::from(column) + 0.5 + (i % 2) as f64, f64::from(row) + 0.5 + (i / 2) as f64);
+            all_in_front = all_in_front && last_before && self.is_above(face, id, texel, sight);
         }
         all_in_front
     }
@@ -208,10 +218,10 @@ impl Shadows {
     /// point's own triangle.
     fn is_above(&self, face: &MapFace, id: u32, texel: (f64, f64), sight: &Sight) -> bool {
         let (plane, own) = (&self.planes[id as usize], &self.planes[sight.triangle as usize]);
-        let ray = face.lens.ray(texel.0, texel.1);
-        let start = ray.start + face.lens.origin;
-        let t = (plane.offset - plane.normal.dot(start)) / plane.normal.dot(ray.direction);
-        let height = own.normal.dot(start + ray.direction * t) - own.offset;
+        let (start, direction) = face.lens.line(texel.0, texel.1);
+        let start = start + face.lens.origin;
+        let t = (plane.offset - plane.normal.dot(start)) / plane.normal.dot(direction);
+        let height = own.normal.dot(start + direction * t) - own.offset;
         height * own.normal.dot(sight.to_light).signum() > self.tolerance
     }
 
@@ -230,7 +240,7 @@ impl Shadows {
             return false;
         }
         let slot = part.mesh().slot(triangle);
-        if part.class(Role::Light, slot) == crate::model::Class::Solid {
+        if part.class(Role::Light, slot) == Class::Solid {
             return true;
         }
         let lens = Lens::parallel(self.origin + sight.place, looking(sight.to_light), [1.0; 2], [0; 2]);
@@ -239,6 +249,21 @@ impl Shadows {
 }
 
 impl MapFace {
+    /// Returns the triangles at a texel, its right neighbor, and the two below.
+    #[inline]
+    fn square(&self, column: i32, row: i32) -> [u32; 4] {
+        let (x, y) = (column as u32, row as u32);
+        let (in_tile_x, in_tile_y) = (x % TILE_WIDTH, y % TILE_HEIGHT);
+        let in_one_tile = in_tile_x + 1 < TILE_WIDTH && in_tile_y + 1 < TILE_HEIGHT;
+        if in_one_tile && x + 1 < self.lens.width && y + 1 < self.lens.height {
+            let tile = &self.tiles[(y / TILE_HEIGHT * self.grid.columns + x / TILE_WIDTH) as usize];
+            let i = (in_tile_y * TILE_WIDTH + in_tile_x) as usize;
+            let below = i + TILE_WIDTH as usize;
+            return [tile[i], tile[i + 1], tile[below], tile[below + 1]];
+        }
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.triangle(column + dx, row + dy))
+    }
+
     fn triangle(&self, column: i32, row: i32) -> u32 {
         if column < 0 || row < 0 || column >= self.lens.width as i32 || row >= self.lens.height as i32 {
             return NO_TRIANGLE;
@@ -246,20 +271,6 @@ impl MapFace {
         let (column, row) = (column as u32, row as u32);
         let tile = (row / TILE_HEIGHT) * self.grid.columns + column / TILE_WIDTH;
         self.tiles[tile as usize][(row % TILE_HEIGHT * TILE_WIDTH + column % TILE_WIDTH) as usize]
-    }
-}
-
-/// Leaves out the faces of the voxel that gives off the light.
-struct OwnFaces(Cell);
-
-impl Without for OwnFaces {
-    fn leaves_out(&self, part: &Part, triangle: usize) -> bool {
-        let bounds = &self.0.bounds;
-        part.object == self.0.object
-            && part.mesh().corners(triangle).iter().all(|p| {
-                let p = p.as_dvec3();
-                p.cmpge(bounds.min).all() && p.cmple(bounds.max).all()
-            })
     }
 }
 

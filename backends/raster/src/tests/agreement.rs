@@ -2,13 +2,13 @@
 
 use super::{camera, cube, plane, scene_of};
 use crate::Raster;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channels, Framebuffer};
 use polyptych_core::metrics::{Errors, Gate};
 use polyptych_core::parallel::Pool;
-use polyptych_core::scene::{Light, Material, Primitive, Scene, Shape, Voxels};
+use polyptych_core::scene::{HeightField, Light, Material, Primitive, Scene, Shape, Voxels};
 use polyptych_core::seam::{Control, Need, Renderer};
 use polyptych_reference::Reference;
 use std::sync::Arc;
@@ -16,6 +16,9 @@ use std::sync::Arc;
 fn scene() -> Scene {
     let body = Shape::Primitive;
     let voxels = Voxels::from_fn([5, 4, 5], |x, y, z| u8::from(x.abs_diff(2) + z.abs_diff(2) + y < 4));
+    let wave =
+        |i: u32| (f64::from(i % 24) * 0.8).sin() as f32 * 0.2 + (f64::from(i / 24) * 0.5).cos() as f32 * 0.2;
+    let hills = HeightField::new(24, 24, DVec2::new(2.4, 2.4), (0..24 * 24).map(wave).collect()).unwrap();
     let mut scene = scene_of(vec![
         (plane(30.0), [0.0; 3]),
         (body(Primitive::Sphere { radius: 0.7 }), [-1.2, 0.7, 0.6]),
@@ -24,6 +27,7 @@ fn scene() -> Scene {
         (body(Primitive::Cone { radius: 0.6, height: 1.3 }), [-2.6, 0.65, -0.4]),
         (Shape::Voxels(voxels), [-1.6, 0.0, 2.6]),
         (cube(1.1), [1.4, 0.55, 3.4]),
+        (Shape::HeightField(hills), [-3.4, 0.4, 2.6]),
     ]);
     scene.objects[2].world_from_object.matrix3 = DMat3::from_rotation_y(0.6);
     scene.objects[3].world_from_object.matrix3 = DMat3::from_rotation_x(1.1);

@@ -164,3 +164,37 @@ fn clear_things_and_lights_without_shadow_block_nothing() {
     scene.objects[1].materials = vec![glass];
     assert_eq!(dark(&scene), 0);
 }
+
+#[test]
+fn a_floor_under_everything_takes_no_texels() {
+    use crate::casters::Casters;
+    use crate::model::{Model, Source};
+    let model_of = |floor_at: f64| {
+        let scene = scene_of(vec![(crumbs(9), [0.0, floor_at, 0.0]), (tetrahedron(), [0.0, 0.0, 0.0])]);
+        let mut model = Model::default();
+        for (i, object) in scene.objects.iter().enumerate() {
+            assert!(model.add(&scene, i, Source::Given(object.shape.clone())));
+        }
+        model
+    };
+    let height = |floor_at: f64, kind: LightKind| {
+        let model = model_of(floor_at);
+        Casters::of(&model, 1e-6).of_light(&model, &kind, None).0.size().x
+    };
+    let sun = |y: f64| LightKind::Directional { direction: DVec3::new(0.3, y, 0.1) };
+    assert!(height(-0.5, sun(-1.0)) < 1.1, "only the tetrahedron");
+    assert!(height(-0.5, sun(1.0)) > 3.5, "the floor is between");
+    assert!(height(0.2, sun(-1.0)) > 3.5, "it reaches through the floor");
+    assert!(height(-0.5, LightKind::Point { position: DVec3::new(0.0, -0.4, 1.0) }) < 1.1);
+    assert!(height(-0.5, LightKind::Point { position: DVec3::new(0.0, -0.6, 1.0) }) > 3.5);
+}
+
+/// A tetrahedron half a meter below and above the origin.
+fn tetrahedron() -> Shape {
+    let corners = [[-0.5, -0.5, -0.5], [0.5, -0.5, -0.5], [0.0, -0.5, 0.5], [0.0, 0.5, 0.0]];
+    Shape::Mesh(Mesh {
+        positions: corners.map(Vec3::from_array).into(),
+        triangles: vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]],
+        ..Mesh::default()
+    })
+}
