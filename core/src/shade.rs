@@ -45,11 +45,28 @@ impl Surface<'_> {
                 LightingModel::BlinnPhong => (to_light + self.to_eye).normalize_or_zero().dot(self.normal),
             };
             if cosine > 0.0 {
-                sum += Vec3::splat(m.specular * cosine.powf(m.shininess));
+                sum += Vec3::splat(m.specular * highlight(cosine, m.shininess));
             }
         }
         sum * radiance
     }
+}
+
+/// Returns `cosine^shininess`; whole exponents, which most materials have, by repeated squaring.
+#[must_use]
+pub fn highlight(cosine: f32, shininess: f32) -> f32 {
+    if shininess.fract() != 0.0 || !(1.0..=65536.0).contains(&shininess) {
+        return cosine.powf(shininess);
+    }
+    let (mut power, mut result, mut left) = (cosine, 1.0, shininess as u32);
+    while left > 0 {
+        if left & 1 == 1 {
+            result *= power;
+        }
+        power *= power;
+        left >>= 1;
+    }
+    result
 }
 
 /// Turns a normal to the viewer's side.
@@ -108,6 +125,16 @@ mod tests {
         }
         assert_eq!(surface.lit_by(LightingModel::Lambert, Vec3::Z, Vec3::ONE), Vec3::new(0.5, 0.25, 0.0));
         assert_eq!(surface.lit_by(LightingModel::Phong, Vec3::NEG_Z, Vec3::ONE), Vec3::ZERO);
+    }
+
+    #[test]
+    fn highlights_agree_with_the_power_function() {
+        for shininess in [0.0, 0.5, 1.0, 7.0, 32.0, 33.5, 1000.0] {
+            for cosine in [0.0, 0.3, 0.9, 0.999, 1.0] {
+                let (fast, exact) = (highlight(cosine, shininess), cosine.powf(shininess));
+                assert!((fast - exact).abs() <= 1e-4 * exact, "{cosine}^{shininess}: {fast} for {exact}");
+            }
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::layers::{Fragment, collect, sort, take_pixel};
 use crate::lens::{Lens, PixelRay};
 use crate::light::{Illumination, Lit, Wants};
 use crate::resolve::{Ask, Point, Resolver};
-use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH, TileBuffer, TileGrid};
+use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH, TileArea, TileBuffer, TileGrid};
 use glam::Vec3;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
 use polyptych_core::seam::{Cancelled, Control};
@@ -96,8 +96,12 @@ impl<'a> Painter<'a> {
         let mut behind_layers = Resolver::new(self.light.scene, self.light.model, self.lens);
         let (mut waiting, mut shaded) = (&fragments[..], 0);
         for row in 0..area.height as u32 {
+            self.background_row(&area, row, band);
             for column in 0..area.width as u32 {
                 let solid = buffer.id[(row * TILE_WIDTH + column) as usize];
+                if solid == NO_TRIANGLE && waiting.is_empty() {
+                    continue;
+                }
                 let (x, y) = (area.x as u32 + column, area.y as u32 + row);
                 let ray = self.lens.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
                 let of_pixel = take_pixel(&mut waiting, column, row);
@@ -113,6 +117,31 @@ impl<'a> Painter<'a> {
             }
         }
         shaded
+    }
+
+    /// Fills a row of a tile with what is seen where nothing is: most pixels of most pictures keep it.
+    fn background_row(&self, area: &TileArea, row: u32, band: &mut Band<'_>) {
+        let from = (row * band.width) as usize + area.x as usize;
+        let pixels = from..from + area.width as usize;
+        let nothing = Pixel::background(Vec3::ZERO);
+        if !band.color.is_empty() {
+            let y = f64::from(area.y as u32 + row) + 0.5;
+            for (column, color) in band.color[pixels.clone()].iter_mut().enumerate() {
+                let ray = self.lens.ray(f64::from(area.x) + column as f64 + 0.5, y);
+                *color = self.background(&ray);
+            }
+        }
+        fn fill<T: Copy>(plane: &mut [T], pixels: std::ops::Range<usize>, value: T) {
+            if !plane.is_empty() {
+                plane[pixels].fill(value);
+            }
+        }
+        fill(band.distance, pixels.clone(), nothing.distance);
+        fill(band.normal, pixels.clone(), nothing.normal);
+        fill(band.id, pixels.clone(), nothing.id);
+        fill(band.albedo, pixels.clone(), nothing.albedo);
+        fill(band.shadow, pixels.clone(), nothing.shadow);
+        fill(band.coverage, pixels, nothing.coverage);
     }
 
     /// Returns the color of a ray that meets nothing.

@@ -12,7 +12,7 @@ use polyptych_core::seam::{
     BackendFactory, BackendInfo, Control, Frame, Need, Parameter, ParameterKind, PassPlan, Phases, Plan,
     Prepared, Registry, RenderError, Renderer, Report, Settings, Value,
 };
-use polyptych_core::shade::fogged;
+use polyptych_core::shade::{fogged, highlight};
 use std::sync::Arc;
 
 /// Back ends that may deliver the visible surfaces; the first is the default.
@@ -360,7 +360,7 @@ impl Painting<'_> {
             if material.specular > 0.0 {
                 let half = (light + to_eye()).normalize_or_zero();
                 let cosine = half.dot(normal).max(0.0);
-                color += Vec3::splat(material.specular * lit * cosine.powf(material.shininess));
+                color += Vec3::splat(material.specular * lit * highlight(cosine, material.shininess));
             }
         }
         fogged(&self.scene.environment, color, f64::from(distance))
