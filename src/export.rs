@@ -230,7 +230,7 @@ fn glb(mesh: &Mesh, scene: &Scene) -> Vec<u8> {
         data.extend(bytes);
     };
     let floats = |list: &[Vec3]| {
-        list.iter().flat_map(|v| v.to_array()).flat_map(f32::to_le_bytes).collect::<Vec<u8>>()
+        list.iter().flat_map(glam::Vec3::to_array).flat_map(f32::to_le_bytes).collect::<Vec<u8>>()
     };
     view(&mut data, floats(&mesh.positions), 34962);
     view(&mut data, floats(&mesh.normals), 34962);

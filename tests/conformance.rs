@@ -100,7 +100,7 @@ fn every_object_is_accounted_for(backend: &str) {
     assert!(drawing.report.objects.iter().all(|d| d.word() == "exact" || !d.why().is_empty()));
     let plan = studio(1).renderer(backend).unwrap().plan(&scene, &need);
     let planned: Vec<_> = plan.objects.iter().map(|o| o.decision.word()).collect();
-    let done: Vec<_> = drawing.report.objects.iter().map(|d| d.word()).collect();
+    let done: Vec<_> = drawing.report.objects.iter().map(polyptych::seam::Decision::word).collect();
     assert_eq!(planned, done, "the plan says what is then done");
 }
 

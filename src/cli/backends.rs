@@ -18,7 +18,7 @@ pub(super) fn run(arguments: &BackendsArguments) -> Result<(), Failure> {
         print(&format!("{}: {} {} ({})\n", info.id, info.name, info.version, origin_text(origin)));
         let native: Vec<_> = info.native.iter().map(|k| k.name()).collect();
         print(&format!("  draws as given: {}; converts the rest\n", native.join(", ")));
-        let channels: Vec<_> = info.channels.iter().map(|c| c.name()).collect();
+        let channels: Vec<_> = info.channels.iter().map(polyptych::prelude::Channel::name).collect();
         print(&format!("  channels: {}\n", channels.join(", ")));
         for p in &info.parameters {
             let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
@@ -54,7 +54,7 @@ fn backend_json(info: &BackendInfo, origin: &Origin) -> Value {
     json!({
         "id": info.id, "name": info.name, "version": info.version, "origin": origin_text(origin),
         "status": "ready", "shapes": shapes,
-        "channels": info.channels.iter().map(|c| c.name()).collect::<Vec<_>>(),
+        "channels": info.channels.iter().map(polyptych::prelude::Channel::name).collect::<Vec<_>>(),
         "parameters": parameters,
     })
 }

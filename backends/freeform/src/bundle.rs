@@ -40,7 +40,7 @@ impl Bundle {
         let axis = self.rays.iter().map(|r| r.direction).sum::<DVec3>().try_normalize()?;
         let spread = self.rays.iter().map(|r| r.origin.distance_squared(origin)).fold(0.0, f64::max).sqrt();
         let cosine = self.rays.iter().map(|r| r.direction.dot(axis)).fold(1.0, f64::min);
-        if !(cosine > 0.5) {
+        if cosine.is_nan() || cosine <= 0.5 {
             return None;
         }
         // A little wider than computed, against rounding.

@@ -185,7 +185,7 @@ impl GridRay {
             return within(-c / b);
         }
         let discriminant = b * b - 4.0 * a * c;
-        if !(discriminant >= 0.0) {
+        if discriminant.is_nan() || discriminant < 0.0 {
             return None;
         }
         let q = -0.5 * (b + discriminant.sqrt().copysign(b));

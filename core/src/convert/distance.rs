@@ -54,7 +54,7 @@ pub(super) fn of_mesh(
         .map(|i| {
             let near = &mut nearest[i];
             let triangle = near.triangle?;
-            let corners = mesh.corners(triangle as usize).map(|p| p.as_dvec3());
+            let corners = mesh.corners(triangle as usize).map(glam::Vec3::as_dvec3);
             let weights = closest_weights(corners, grid.sample(i)).as_vec3();
             let color = triangle_color(scene, object, mesh, triangle as usize, weights);
             if color.is_none() {
@@ -136,7 +136,7 @@ fn nearest_triangles(mesh: &Mesh, grid: &Grid, threads: &dyn Threads) -> Vec<Nea
     for t in 0..mesh.triangles.len() {
         let corners = mesh.corners(t);
         if corners.iter().all(|p| p.is_finite()) {
-            let box_ = Aabb::of_points(corners.map(|p| p.as_dvec3()));
+            let box_ = Aabb::of_points(corners.map(glam::Vec3::as_dvec3));
             for z in grid.span(2, box_.min.z, box_.max.z, DistanceModel::BAND) {
                 of_slab[z].push(t as u32);
             }
@@ -147,7 +147,7 @@ fn nearest_triangles(mesh: &Mesh, grid: &Grid, threads: &dyn Threads) -> Vec<Nea
         nearest.chunks_mut(slab).zip(of_slab.iter().map(Vec::as_slice)).collect();
     for_each_mut(threads, &mut slabs, 1, &|z, (samples, triangles)| {
         for &t in *triangles {
-            let corners = mesh.corners(t as usize).map(|p| p.as_dvec3());
+            let corners = mesh.corners(t as usize).map(glam::Vec3::as_dvec3);
             let box_ = Aabb::of_points(corners);
             for y in grid.span(1, box_.min.y, box_.max.y, DistanceModel::BAND) {
                 for x in grid.span(0, box_.min.x, box_.max.x, DistanceModel::BAND) {
@@ -235,7 +235,7 @@ fn count_crossings(mesh: &Mesh, grid: &Grid, axis: usize, votes: &mut [u8]) {
     let (nu, nv) = (grid.size[u] as usize, grid.size[v] as usize);
     let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); nu * nv];
     for t in 0..mesh.triangles.len() {
-        let corners = mesh.corners(t).map(|p| p.as_dvec3());
+        let corners = mesh.corners(t).map(glam::Vec3::as_dvec3);
         if corners.iter().any(|p| !p.is_finite()) {
             continue;
         }

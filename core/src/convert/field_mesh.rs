@@ -130,7 +130,7 @@ fn surface_cells(volume: &Volume) -> Vec<[u32; 3]> {
         }
         let value = volume.samples().get(((z - 1) * ny + y - 1) * nx + x - 1);
         // What is not a number is outside.
-        (value >= level - slack, !(value > level + slack))
+        (value >= level - slack, value.is_nan() || value <= level + slack)
     };
     let mut cells = Vec::new();
     for z in 0..=nz {
@@ -366,7 +366,7 @@ fn with_normals(field: &impl Field, positions: &[DVec3], triangles: &[[u32; 3]])
 fn deviation(field: &impl Field, mesh: &Mesh, cell: f64) -> (f64, f64) {
     let mut distances = Vec::with_capacity(mesh.triangles.len() * 5);
     for t in 0..mesh.triangles.len() {
-        let [a, b, c] = mesh.corners(t).map(|p| p.as_dvec3());
+        let [a, b, c] = mesh.corners(t).map(glam::Vec3::as_dvec3);
         for p in [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0, a] {
             let slope = field.gradient(p).length();
             let distance = if slope > 0.0 { field.value(p).abs() / slope } else { cell };

@@ -124,7 +124,7 @@ mod tests {
             mesh.check().unwrap();
             assert!(bound <= tolerance.max(deviation(&field, 1)));
             for t in 0..mesh.triangles.len() {
-                let [a, b, c] = mesh.corners(t).map(|p| p.as_dvec3());
+                let [a, b, c] = mesh.corners(t).map(glam::Vec3::as_dvec3);
                 for p in [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0] {
                     let error = (field.height_and_normal(p.x, p.z).0 - p.y).abs();
                     assert!(error <= bound + 1e-6, "{error} over {bound}");

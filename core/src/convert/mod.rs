@@ -306,8 +306,11 @@ fn class_tolerance(tolerance: f64) -> f64 {
 
 /// Results by shape, class and the materials that went into them.
 struct Cache<T> {
-    entries: Mutex<HashMap<(usize, i32, u32), Vec<Entry<T>>>>,
+    entries: Mutex<HashMap<Key, Vec<Entry<T>>>>,
 }
+
+/// Address of the shape, class of the tolerance, and resolution.
+type Key = (usize, i32, u32);
 
 struct Entry<T> {
     /// Keeps the address of the shape from being used again while the entry stands.
@@ -324,7 +327,7 @@ impl<T> Default for Cache<T> {
 }
 
 impl<T> Cache<T> {
-    fn key(object: &Object, detail: Detail) -> (usize, i32, u32) {
+    fn key(object: &Object, detail: Detail) -> Key {
         (Arc::as_ptr(&object.shape) as usize, class_of(detail.tolerance), detail.max_resolution)
     }
 

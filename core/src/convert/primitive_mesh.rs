@@ -261,7 +261,7 @@ mod tests {
             let Some(form) = body.form() else { continue };
             let (mesh, bound) = tessellate(&body, 0.02);
             for t in 0..mesh.triangles.len() {
-                let [a, b, c] = mesh.corners(t).map(|p| p.as_dvec3());
+                let [a, b, c] = mesh.corners(t).map(glam::Vec3::as_dvec3);
                 for p in [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0] {
                     let (value, gradient) = form.value_and_gradient(p);
                     let distance = value.abs() / gradient.length().max(1e-3);

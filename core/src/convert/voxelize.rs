@@ -53,7 +53,7 @@ pub(super) fn voxelize(
                 fill_form(scene, object, form.form(), &grid, &surface, &mut cells);
             }
             None => {
-                fill_mesh(scene, object, &primitive_mesh::tessellate(primitive, cell).0, &grid, &mut cells)
+                fill_mesh(scene, object, &primitive_mesh::tessellate(primitive, cell).0, &grid, &mut cells);
             }
         },
         Shape::FreeForm(form) => fill_form(scene, object, form.form(), &grid, &|_, _| None, &mut cells),
@@ -137,7 +137,7 @@ impl CellColors {
 fn fill_mesh(scene: &Scene, object: &Object, mesh: &Mesh, grid: &Grid, cells: &mut CellColors) {
     let half = DVec3::splat(grid.cell * 0.5);
     for t in 0..mesh.triangles.len() {
-        let corners = mesh.corners(t).map(|p| p.as_dvec3());
+        let corners = mesh.corners(t).map(glam::Vec3::as_dvec3);
         if corners.iter().any(|p| !p.is_finite()) {
             continue;
         }

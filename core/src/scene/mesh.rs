@@ -63,7 +63,7 @@ impl Mesh {
     pub fn area(&self) -> f64 {
         (0..self.triangles.len())
             .map(|t| {
-                let [a, b, c] = self.corners(t).map(|p| p.as_dvec3());
+                let [a, b, c] = self.corners(t).map(glam::Vec3::as_dvec3);
                 (b - a).cross(c - a).length() * 0.5
             })
             .sum()
@@ -74,7 +74,7 @@ impl Mesh {
     pub fn volume(&self) -> f64 {
         (0..self.triangles.len())
             .map(|t| {
-                let [a, b, c] = self.corners(t).map(|p| p.as_dvec3());
+                let [a, b, c] = self.corners(t).map(glam::Vec3::as_dvec3);
                 a.dot(b.cross(c)) / 6.0
             })
             .sum()

@@ -99,7 +99,7 @@ impl Texture {
     pub fn triplanar(&self, position: Vec3, normal: Vec3, lod: f32) -> Vec4 {
         let weight = (normal * normal) * (normal * normal);
         let sum = weight.element_sum();
-        if !(sum > 0.0) {
+        if sum.is_nan() || sum <= 0.0 {
             return self.sample([position.x, position.y], lod);
         }
         let (p, mut color) = (position, Vec4::ZERO);
