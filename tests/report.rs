@@ -13,7 +13,7 @@ fn the_page_works_in_headless_chromium() {
     }
     let out = std::env::temp_dir().join(format!("polyptych-report-{}", std::process::id()));
     let done = Command::new(env!("CARGO_BIN_EXE_polyptych"))
-        .args(["compare", "builtin:figure", "--size", "320x180", "-q", "-o"])
+        .args(["compare", "builtin:polyhedra", "--size", "320x180", "-q", "-o"])
         .arg(&out)
         .status()
         .expect("the command starts");

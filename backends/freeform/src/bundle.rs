@@ -67,10 +67,17 @@ pub(crate) struct Hit {
     pub(crate) t: f64,
     /// Index of the body, [`Hit::NOTHING`] for none.
     pub(crate) body: u32,
+    /// Outward normal of a free form in its object space, not of unit length; zero for other bodies.
+    pub(crate) normal: DVec3,
 }
 
 impl Hit {
     pub(crate) const NOTHING: u32 = u32::MAX;
+
+    /// A ray that met nothing up to a distance.
+    pub(crate) fn nothing(far: f64) -> Self {
+        Self { t: far, body: Self::NOTHING, normal: DVec3::ZERO }
+    }
 
     pub(crate) fn is_some(&self) -> bool {
         self.body != Self::NOTHING

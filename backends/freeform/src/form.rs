@@ -6,7 +6,7 @@
 
 use crate::bundle::{Bundle, Crossing, Hit};
 use crate::lanes::{LANES, Lanes, Mask};
-use crate::program::{Active, Program, value_and_gradient};
+use crate::program::{Active, Program, Step, value_and_gradient};
 use crate::roots::{RayQuadric, Stack, first_roots};
 use glam::{DAffine3, DVec3};
 use polyptych_core::math::Aabb;
@@ -69,7 +69,7 @@ impl FormBody {
         if scratch.leaves.len() < self.program.leaves.len() {
             scratch.leaves.resize(self.program.leaves.len(), zero);
         }
-        let FormScratch { active, leaves, stack, alive, .. } = scratch;
+        let FormScratch { active, leaves, stack, alive, values } = scratch;
         let center = self.bounds.center();
         for packet in alive.chunks(LANES) {
             let lane = |i: usize| packet[i.min(packet.len() - 1)];
@@ -86,7 +86,7 @@ impl FormBody {
             let to: [f64; LANES] = std::array::from_fn(|i| stretch[i].1 - around[i]);
             let reach = std::array::from_fn(|i| from[i].abs().max(to[i].abs()));
             for &step in &active.steps {
-                if let crate::program::Step::Leaf(leaf) = step {
+                if let Step::Leaf(leaf) = step {
                     let quadric = &self.program.leaves[leaf as usize];
                     leaves[leaf as usize] = ray_quadric(quadric, &rays, &around, &reach);
                 }
@@ -100,9 +100,17 @@ impl FormBody {
             let (from, to) = (Lanes(from.map(|v| v as f32)), Lanes(to.map(|v| v as f32)));
             let (found, root) = first_roots(&active.steps, leaves, from, to, open, crossing, stack);
             for (i, alive) in packet.iter().enumerate() {
+                if !found.has(i) {
+                    continue;
+                }
                 let t = around[i] + f64::from(root.0[i]);
-                if found.has(i) && t < hits[alive.ray].t {
-                    hits[alive.ray] = Hit { t, body };
+                let (t, normal) = match crossing {
+                    Crossing::Any => self.polish(alive, t, &active.steps, values),
+                    // What blocks light is not looked at.
+                    Crossing::Entry => (t, DVec3::ZERO),
+                };
+                if t < hits[alive.ray].t {
+                    hits[alive.ray] = Hit { t, body, normal };
                 }
             }
         }
@@ -158,29 +166,14 @@ impl FormBody {
     }
 
     /// Improves a distance along a ray by a step of Newton's method in double precision and returns it with the
-    /// outward normal there, both in object space.
-    pub(crate) fn polish(
-        &self,
-        origin: DVec3,
-        direction: DVec3,
-        t: f64,
-        scratch: &mut FormScratch,
-    ) -> (f64, DVec3) {
-        let steps = &self.program.steps;
-        let mut t = t;
-        let mut normal = -direction;
-        for _ in 0..2 {
-            let p = origin + direction * t;
-            let (value, gradient) = value_and_gradient(&self.program, steps, p, &mut scratch.values);
-            normal = -gradient;
-            let slope = gradient.dot(direction);
-            let step = value / slope;
-            // Near a tangent or a crease a step may lead away: single precision was right to 1e-5 of the size.
-            if step.is_finite() && step.abs() * direction.length() < self.bounds.radius() * 1e-4 {
-                t -= step;
-            }
-        }
-        (t, normal)
+    /// outward normal, in object space.
+    fn polish(&self, ray: &Alive, t: f64, steps: &[Step], values: &mut Vec<(f64, DVec3)>) -> (f64, DVec3) {
+        let p = ray.origin + ray.direction * t;
+        let (value, gradient) = value_and_gradient(&self.program, steps, p, values);
+        let step = value / gradient.dot(ray.direction);
+        // Near a tangent or a crease a step may lead away: single precision was right to 1e-5 of the size.
+        let small = step.is_finite() && step.abs() * ray.direction.length() < self.bounds.radius() * 1e-4;
+        (if small { t - step } else { t }, -gradient)
     }
 }
 

@@ -125,7 +125,7 @@ impl FrameDrawing<'_> {
         form: &mut FormScratch,
     ) {
         hits.clear();
-        hits.extend(bundle.rays.iter().map(|r| Hit { t: r.far, body: Hit::NOTHING }));
+        hits.extend(bundle.rays.iter().map(|r| Hit::nothing(r.far)));
         let cone = bundle.cone();
         for (index, body) in self.world.bodies.iter().enumerate() {
             if wanted(body) && cone.is_none_or(|c| c.touches(body.center, body.radius)) {
@@ -154,7 +154,7 @@ impl FrameDrawing<'_> {
                 self.nearest(|b| b.see_through && !b.is_volume(), layer_rays, layer, form);
             } else {
                 layer.clear();
-                layer.extend(layer_rays.rays.iter().map(|r| Hit { t: r.far, body: Hit::NOTHING }));
+                layer.extend(layer_rays.rays.iter().map(|r| Hit::nothing(r.far)));
             }
             if volumes {
                 self.march_volumes(scratch);
@@ -290,8 +290,7 @@ impl FrameDrawing<'_> {
                 continue;
             }
             let body = &self.world.bodies[hit.body as usize];
-            let point: Point<'_> = body.point(scene, ray.origin, ray.direction, hit.t, form);
-            hit.t = point.t;
+            let point: Point<'_> = body.point(scene, ray.origin, ray.direction, hit);
             let normal = facing(point.normal, ray.direction);
             let surface = surface(&point, normal, ray.direction);
             lit.shaded.push(Shaded {
@@ -345,7 +344,7 @@ impl FrameDrawing<'_> {
             lit.shadow_of.push(i as u32);
         }
         lit.blocked.clear();
-        lit.blocked.extend(lit.shadow_rays.rays.iter().map(|r| Hit { t: r.far, body: Hit::NOTHING }));
+        lit.blocked.extend(lit.shadow_rays.rays.iter().map(|r| Hit::nothing(r.far)));
         if light.casts_shadow && self.options.shadows && !lit.shadow_rays.rays.is_empty() {
             let cone = lit.shadow_rays.cone();
             for (i, body) in self.world.bodies.iter().enumerate() {

@@ -145,7 +145,7 @@ impl Body {
                 _ => (direction.y != 0.0 && near > 0.0).then_some(near),
             };
             if let Some(t) = t.filter(|&t| t < hit.t) {
-                *hit = Hit { t, body: index };
+                *hit = Hit { t, body: index, normal: DVec3::ZERO };
             }
         }
     }
@@ -156,23 +156,19 @@ impl Body {
         scene: &'a Scene,
         origin: DVec3,
         direction: DVec3,
-        t: f64,
-        scratch: &mut FormScratch,
+        hit: &Hit,
     ) -> Point<'a> {
-        let local_origin = self.object_from_world.transform_point3(origin);
-        let local_direction = self.object_from_world.transform_vector3(direction);
+        let t = hit.t;
+        let position = origin + direction * t;
+        let local = self.object_from_world.transform_point3(position);
         let object = &scene.objects[self.object];
-        let (mut t, mut uv, mut slot_material) = (t, None, scene.material(object, 0));
-        let mut local = local_origin + local_direction * t;
+        let (mut uv, mut slot_material) = (None, scene.material(object, 0));
         let normal = match (&*self.geometry, &*self.shape) {
-            (Geometry::Form(form), shape) => {
-                let (polished, normal) = form.polish(local_origin, local_direction, t, scratch);
-                t = polished;
-                local = local_origin + local_direction * t;
+            (Geometry::Form(_), shape) => {
                 if let Shape::Primitive(primitive) = shape {
-                    uv = Some(primitive.uv(local, normal.normalize_or_zero()));
+                    uv = Some(primitive.uv(local, hit.normal.normalize_or_zero()));
                 }
-                normal
+                hit.normal
             }
             (Geometry::Plane { width, depth }, _) => {
                 let plane = Primitive::Plane { width: *width, depth: *depth };
@@ -194,7 +190,7 @@ impl Body {
         let (color, opacity) = scene.base_color(slot_material, uv, local.as_vec3(), unit.as_vec3(), 0.0);
         Point {
             t,
-            position: origin + direction * t,
+            position,
             normal: (self.normal_map * normal).normalize_or(-direction),
             material: slot_material,
             color,

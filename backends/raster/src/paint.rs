@@ -95,8 +95,12 @@ impl<'a> Painter<'a> {
         let mut surfaces = Resolver::new(self.light.scene, self.light.model, self.lens);
         let mut behind_layers = Resolver::new(self.light.scene, self.light.model, self.lens);
         let (mut waiting, mut shaded) = (&fragments[..], 0);
+        let empty = self.bins.solid(tile).next().is_none() && waiting.is_empty();
         for row in 0..area.height as u32 {
             self.background_row(&area, row, band);
+            if empty {
+                continue;
+            }
             for column in 0..area.width as u32 {
                 let solid = buffer.id[(row * TILE_WIDTH + column) as usize];
                 if solid == NO_TRIANGLE && waiting.is_empty() {
@@ -125,10 +129,15 @@ impl<'a> Painter<'a> {
         let pixels = from..from + area.width as usize;
         let nothing = Pixel::background(Vec3::ZERO);
         if !band.color.is_empty() {
-            let y = f64::from(area.y as u32 + row) + 0.5;
+            // The heights of the directions alone, in the precision of colors: most pixels see nothing else.
+            let place = (f64::from(area.x) + 0.5, f64::from(area.y as u32 + row) + 0.5);
+            let first = self.lens.line(place.0, place.1).1;
+            let step = (self.lens.line(place.0 + 1.0, place.1).1 - first).as_vec3();
+            let first = first.as_vec3();
+            let background = &self.light.scene.environment.background;
             for (column, color) in band.color[pixels.clone()].iter_mut().enumerate() {
-                let ray = self.lens.ray(f64::from(area.x) + column as f64 + 0.5, y);
-                *color = self.background(&ray);
+                let direction = first + step * column as f32;
+                *color = finite(background.color_at(direction.y / direction.length()));
             }
         }
         fn fill<T: Copy>(plane: &mut [T], pixels: std::ops::Range<usize>, value: T) {

@@ -91,11 +91,21 @@ impl Background {
     /// Returns the color in a direction of unit length.
     #[must_use]
     pub fn color(&self, direction: DVec3) -> Vec3 {
+        self.color_at(direction.y as f32)
+    }
+
+    /// Returns the color in directions of that height: the y component of a direction of unit length.
+    #[must_use]
+    #[inline]
+    pub fn color_at(&self, height: f32) -> Vec3 {
         match *self {
             Self::Solid(color) => color,
             Self::Gradient { below, horizon, above } => {
-                let height = direction.y as f32;
-                if height >= 0.0 { horizon.lerp(above, height) } else { horizon.lerp(below, -height) }
+                if height >= 0.0 {
+                    horizon.lerp(above, height)
+                } else {
+                    horizon.lerp(below, -height)
+                }
             }
         }
     }
