@@ -113,7 +113,7 @@ fn info() -> BackendInfo {
             Parameter {
                 name: "detail.resolution",
                 kind: ParameterKind::Int { min: 16, max: 1024 },
-                default: Value::Int(192),
+                default: Value::Int(128),
                 unit: "cells",
                 help: "Most cells along the longest edge of an object that is converted",
                 tag: "detail.tolerance",

@@ -66,7 +66,7 @@ pub(super) fn of_form(form: &FreeForm, tolerance: f64, finest: u32, threads: &dy
         let grid = Grid::around(&form.bounds(), resolution);
         let cells = grid.cells_by_intervals(form);
         let mesh = contour(form, &grid, &cells, threads);
-        let (worst, most) = deviation(form, &mesh, grid.cell);
+        let (worst, most) = deviation(form, &mesh, grid.cell, threads);
         // On smooth parts the error falls to a quarter with each halving of the cells; where creases meet, only
         // to a half. For a last hundredth of the surface that is not worth it: the bound says what was reached.
         let at_creases = most * 1.5 <= tolerance && worst > 0.35 * last_worst;
@@ -366,16 +366,18 @@ fn with_normals(field: &impl Field, positions: &[DVec3], triangles: &[[u32; 3]])
 
 /// Returns the greatest distance of the middles of edges and faces from the surface, to first order, and the one
 /// below which 99 of 100 lie.
-fn deviation(field: &impl Field, mesh: &Mesh, cell: f64) -> (f64, f64) {
-    let mut distances = Vec::with_capacity(mesh.triangles.len() * 5);
-    for t in 0..mesh.triangles.len() {
+fn deviation(field: &impl Field, mesh: &Mesh, cell: f64, threads: &dyn Threads) -> (f64, f64) {
+    let mut by_triangle = vec![[0.0_f64; 5]; mesh.triangles.len()];
+    for_each_mut(threads, &mut by_triangle, 512, &|t, distances| {
         let [a, b, c] = mesh.corners(t).map(glam::Vec3::as_dvec3);
-        for p in [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0, a] {
+        let places = [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0, a];
+        *distances = places.map(|p| {
             let slope = field.gradient(p).length();
             let distance = if slope > 0.0 { field.value(p).abs() / slope } else { cell };
-            distances.push(distance.min(cell * 2.0));
-        }
-    }
+            distance.min(cell * 2.0)
+        });
+    });
+    let distances = by_triangle.as_flattened_mut();
     if distances.is_empty() {
         return (cell, cell);
     }
