@@ -1,0 +1,161 @@
+//! How is the picture of one back end shown, with its name, its time, and what it did to the scene?
+
+use crate::painter::{Painter, Painting};
+use eframe::egui::{self, Color32, Pos2, Rect, RichText, TextureHandle, TextureOptions, Vec2};
+use polyptych::framebuffer::Channel;
+use polyptych::scene::Scene;
+use polyptych::seam::Decision;
+
+/// A back end's place in the window.
+pub(crate) struct Pane {
+    pub(crate) backend: String,
+    pub(crate) channel: Channel,
+    pub(crate) painter: Painter,
+    /// Size of the picture that is shown, in pixels of the screen.
+    pub(crate) size: [u32; 2],
+    shown: Option<Painting>,
+    texture: Option<TextureHandle>,
+    pub(crate) failure: Option<String>,
+}
+
+impl Pane {
+    pub(crate) fn new(backend: String, channel: Channel, painter: Painter) -> Self {
+        Self { backend, channel, painter, size: [0, 0], shown: None, texture: None, failure: None }
+    }
+
+    /// Takes what the painter has finished since the last time.
+    pub(crate) fn update(&mut self, ctx: &egui::Context) {
+        match self.painter.take() {
+            None => {}
+            Some(Err(why)) => self.failure = Some(why),
+            Some(Ok(painting)) => {
+                self.failure = None;
+                let bytes = painting.pixels.as_flattened();
+                let image = egui::ColorImage::from_rgb(painting.size, bytes);
+                match &mut self.texture {
+                    Some(texture) => texture.set(image, TextureOptions::LINEAR),
+                    None => self.texture = Some(ctx.load_texture("picture", image, TextureOptions::LINEAR)),
+                }
+                self.shown = Some(painting);
+            }
+        }
+    }
+
+    /// Returns what is shown.
+    pub(crate) fn painting(&self) -> Option<&Painting> {
+        self.shown.as_ref()
+    }
+
+    /// Draws the picture into a rectangle, or the part of it inside `clip`.
+    pub(crate) fn draw(&self, painter: &egui::Painter, rect: Rect, clip: Rect) {
+        let painter = painter.with_clip_rect(clip.intersect(painter.clip_rect()));
+        let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+        match &self.texture {
+            Some(texture) => drop(painter.image(texture.id(), rect, whole, Color32::WHITE)),
+            None => drop(painter.rect_filled(rect, 0.0, Color32::from_gray(32))),
+        }
+    }
+
+    /// Says how long the picture took, or why there is none.
+    pub(crate) fn status(&self) -> String {
+        if let Some(why) = &self.failure {
+            return why.clone();
+        }
+        let Some(painting) = &self.shown else { return "drawing".to_owned() };
+        let busy = if self.painter.is_busy() || !painting.is_full { " ..." } else { "" };
+        format!("{:.1} ms{busy}", painting.frame.as_secs_f64() * 1e3)
+    }
+
+    /// Shows the line above the picture: back end, channel, time, and the badge with what was not drawn exactly.
+    /// Tells whether something was chosen.
+    pub(crate) fn header(
+        &mut self,
+        ui: &mut egui::Ui,
+        backends: &[String],
+        number: usize,
+        scene: &Scene,
+    ) -> bool {
+        let before = (self.backend.clone(), self.channel);
+        ui.horizontal(|ui| {
+            egui::ComboBox::from_id_salt(("back end", number)).selected_text(&self.backend).show_ui(
+                ui,
+                |ui| {
+                    for id in backends {
+                        ui.selectable_value(&mut self.backend, id.clone(), id);
+                    }
+                },
+            );
+            egui::ComboBox::from_id_salt(("channel", number)).selected_text(self.channel.name()).show_ui(
+                ui,
+                |ui| {
+                    for channel in Channel::ALL {
+                        ui.selectable_value(&mut self.channel, channel, channel.name());
+                    }
+                },
+            );
+            let color =
+                if self.failure.is_some() { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+            let status = ui.label(RichText::new(self.status()).color(color));
+            if let Some(painting) = &self.shown {
+                status.on_hover_text(format!("prepared in {:.1} ms", painting.prepare.as_secs_f64() * 1e3));
+            }
+            self.badge(ui, number, scene);
+        });
+        before != (self.backend.clone(), self.channel)
+    }
+
+    /// Shows how many objects were not drawn as given; a click lists them.
+    fn badge(&self, ui: &mut egui::Ui, number: usize, scene: &Scene) {
+        let Some(painting) = self.shown.as_ref().filter(|p| p.backend == self.backend) else { return };
+        let other: Vec<_> = scene
+            .objects
+            .iter()
+            .zip(painting.decisions.iter())
+            .filter(|(_, decision)| !matches!(decision, Decision::Exact))
+            .collect();
+        if other.is_empty() {
+            return;
+        }
+        let text = format!("{} of {} objects not as given", other.len(), scene.objects.len());
+        ui.push_id(("decisions", number), |ui| {
+            ui.menu_button(text, |ui| {
+                egui::ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
+                    for (object, decision) in other {
+                        ui.label(format!("{}: {}: {}", object.name, decision.word(), decision.why()));
+                    }
+                });
+            });
+        });
+    }
+}
+
+/// Divides a rectangle among panes, as square as can be.
+pub(crate) fn grid(rect: Rect, count: usize) -> Vec<Rect> {
+    let columns = (1..=count).find(|c| c * c >= count).unwrap_or(1);
+    let rows = count.div_ceil(columns);
+    let cell = Vec2::new(rect.width() / columns as f32, rect.height() / rows as f32);
+    (0..count)
+        .map(|i| {
+            let place = Vec2::new((i % columns) as f32 * cell.x, (i / columns) as f32 * cell.y);
+            Rect::from_min_size(rect.min + place, cell)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panes_share_the_window_without_overlap() {
+        let rect = Rect::from_min_size(Pos2::new(10.0, 20.0), Vec2::new(900.0, 600.0));
+        for count in 1..=9 {
+            let cells = grid(rect, count);
+            assert_eq!(cells.len(), count);
+            for (i, cell) in cells.iter().enumerate() {
+                assert!(rect.expand(0.1).contains_rect(*cell));
+                assert!(cells[..i].iter().all(|other| other.intersect(*cell).area() < 1.0));
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Does the viewer do what its user asks, without a display?
+
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use polyptych::BuiltinBackends;
+use polyptych::seam::Registry;
+use polyptych_viewer::{Mode, Viewer};
+use std::time::{Duration, Instant};
+
+fn window(scene: &str) -> Harness<'static, Viewer> {
+    let scene = polyptych::builtin::scene(scene).unwrap();
+    let viewer = Viewer::new(Registry::builtin(), scene).unwrap();
+    let mut harness = Harness::builder()
+        .with_size(Vec2::new(640.0, 360.0))
+        .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui), viewer);
+    rest(&mut harness);
+    harness
+}
+
+/// Lets the painters finish.
+fn rest(harness: &mut Harness<'_, Viewer>) {
+    let begin = Instant::now();
+    harness.step();
+    harness.step();
+    while !harness.state().is_at_rest() {
+        assert!(begin.elapsed() < Duration::from_secs(100), "the panes never come to rest");
+        std::thread::sleep(Duration::from_millis(5));
+        harness.step();
+    }
+    harness.step();
+}
+
+fn press(harness: &mut Harness<'_, Viewer>, key: Key) {
+    harness.key_press(key);
+    rest(harness);
+}
+
+fn colors(harness: &Harness<'_, Viewer>, pane: usize) -> usize {
+    let (pixels, [width, height]) = harness.state().picture(pane).expect("a picture");
+    assert_eq!(pixels.len(), width * height);
+    let mut seen: Vec<_> = pixels.to_vec();
+    seen.sort_unstable();
+    seen.dedup();
+    seen.len()
+}
+
+fn drag(harness: &mut Harness<'_, Viewer>, from: Pos2, to: Pos2) {
+    let button = |pos, pressed| Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    };
+    for event in [Event::PointerMoved(from), button(from, true)] {
+        harness.event(event);
+        harness.step();
+    }
+    for event in [Event::PointerMoved(from.lerp(to, 0.5)), Event::PointerMoved(to), button(to, false)] {
+        harness.event(event);
+        harness.step();
+    }
+    rest(harness);
+}
+
+#[test]
+fn two_back_ends_stand_side_by_side_at_once() {
+    let harness = window("polyhedra");
+    assert_eq!(harness.state().shown().collect::<Vec<_>>(), ["raster", "reference"]);
+    assert!(colors(&harness, 0) > 50 && colors(&harness, 1) > 50);
+    let (a, b) = (harness.state().picture(0).unwrap(), harness.state().picture(1).unwrap());
+    assert_eq!(a.1, b.1, "panes of one size");
+    let differ =
+        a.0.iter().zip(b.0).filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 8)).count();
+    assert!(differ * 50 < a.0.len(), "the same scene from the same side: {differ} of {}", a.0.len());
+}
+
+#[test]
+fn switching_keeps_camera_and_settings() {
+    let mut harness = window("polyhedra");
+    drag(&mut harness, Pos2::new(160.0, 200.0), Pos2::new(200.0, 210.0));
+    let camera = harness.state().camera().clone();
+    let ids: Vec<_> = Registry::builtin().ids().map(str::to_owned).collect();
+    for (digit, id) in [Key::Num1, Key::Num3, Key::Num5, Key::Num2].into_iter().zip([0, 2, 4, 1]) {
+        press(&mut harness, digit);
+        assert_eq!(harness.state().shown().next(), Some(ids[id].as_str()));
+        assert_eq!(harness.state().camera().eye, camera.eye);
+        assert!(colors(&harness, 0) > 20, "{}", ids[id]);
+    }
+    assert_eq!(harness.state().shown().nth(1), Some("reference"), "the other pane is left alone");
+}
+
+#[test]
+fn dragging_turns_the_camera_of_all_panes() {
+    let mut harness = window("polyhedra");
+    let (eye, before) = (harness.state().camera().eye, harness.state().picture(1).unwrap().0.to_vec());
+    drag(&mut harness, Pos2::new(160.0, 200.0), Pos2::new(260.0, 200.0));
+    let turned = harness.state().camera().eye;
+    assert!(turned.distance(eye) > 0.1, "{eye} {turned}");
+    assert_ne!(before, harness.state().picture(1).unwrap().0, "the pane beside it turned, too");
+}
+
+#[test]
+fn a_parameter_changes_the_picture_and_is_kept() {
+    let mut harness = window("polyhedra");
+    let before = harness.state().picture(0).unwrap().0.to_vec();
+    harness.get_by_label("Settings").click();
+    rest(&mut harness);
+    drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
+    let shadow = harness.get_all_by_label("on").next().expect("the switch for shadows");
+    shadow.click();
+    rest(&mut harness);
+    let set = |harness: &Harness<'_, Viewer>| harness.state().settings("raster").iter().count();
+    assert_eq!(set(&harness), 1);
+    assert_ne!(before, harness.state().picture(0).unwrap().0, "no shadows any more");
+    press(&mut harness, Key::Num3);
+    press(&mut harness, Key::Num2);
+    assert_eq!(harness.state().shown().next(), Some("raster"));
+    assert_eq!(set(&harness), 1, "what was set is still set");
+}
+
+#[test]
+fn modes_and_panes_follow_the_bar() {
+    let mut harness = window("polyhedra");
+    harness.get_by_label("Wipe").click();
+    rest(&mut harness);
+    assert_eq!(harness.state().mode(), Mode::Wipe);
+    assert!(harness.state().picture(0).unwrap().1[0] > 600, "both have the whole width");
+    press(&mut harness, Key::X);
+    assert_eq!(harness.state().mode(), Mode::SideBySide);
+    harness.get_by_label("4").click();
+    rest(&mut harness);
+    assert_eq!(harness.state().shown().count(), 4);
+    assert!((0..4).all(|pane| colors(&harness, pane) > 20));
+}
+
+#[test]
+fn what_cannot_be_opened_is_said_and_nothing_is_lost() {
+    let mut harness = window("polyhedra");
+    let (ctx, name) = (harness.ctx.clone(), harness.state().scene().name.clone());
+    harness.state_mut().open("/nowhere/nothing.obj", &ctx);
+    rest(&mut harness);
+    assert_eq!(harness.state().scene().name, name);
+    assert!(harness.query_by_label_contains("/nowhere/nothing.obj").is_some(), "the reason is shown");
+    harness.state_mut().open("builtin:quadrics", &ctx);
+    rest(&mut harness);
+    assert_eq!(harness.state().scene().name, "quadrics");
+}
