@@ -14,15 +14,17 @@
 //! Source of storing names instead of depths: J. C. Hourcade, A. Nicolas, *Algorithms for antialiased cast
 //! shadows*, Computers & Graphics 9(3), 1985; comparing planes instead of equal names is ours.
 
+use crate::batch::{BATCH, OCTETS};
 use crate::bin::{Bins, Pass};
 use crate::casters::Casters;
+use crate::face::{Face, Place};
 use crate::lens::{Lens, Rays, cube_axes, cube_face};
 use crate::light::Lamp;
 use crate::model::{Class, Model, Role};
-use crate::resolve::{Ask, Resolver};
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileBuffer, TileGrid};
 use crate::transform::{ScreenVertex, transform};
 use glam::{DMat3, DVec3};
+use polyptych_core::lanes::{DVec3x8, LANES};
 use polyptych_core::math::{Aabb, orthonormal_basis};
 use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{LightKind, Scene};
@@ -54,7 +56,7 @@ struct Map {
     faces: Vec<MapFace>,
 }
 
-struct MapFace {
+pub(crate) struct MapFace {
     lens: Lens,
     grid: TileGrid,
     tiles: Vec<[u32; TILE_PIXELS]>,
@@ -76,6 +78,38 @@ pub(crate) struct Sight {
     pub(crate) triangle: u32,
     pub(crate) to_light: DVec3,
     pub(crate) distance: f64,
+}
+
+/// What the map of a light shows around the points of a batch.
+pub(crate) struct Looks<'a> {
+    /// Nothing where the light does not see the point.
+    face: [Option<&'a MapFace>; BATCH],
+    /// Column and row of the first of the texels whose centers are the corners of the square around the point.
+    texel: [[i32; 2]; BATCH],
+    ids: [[u32; 4]; BATCH],
+}
+
+impl<'a> Looks<'a> {
+    pub(crate) fn none() -> Self {
+        Self { face: [None; BATCH], texel: [[0; 2]; BATCH], ids: [[NO_TRIANGLE; 4]; BATCH] }
+    }
+
+    /// Looks where a point falls on a column and row of a face, if the light sees them.
+    #[inline(always)]
+    fn look(&mut self, i: usize, face: &'a MapFace, x: f64, y: f64, ahead: f64) {
+        let (right, bottom) = (f64::from(face.lens.width) + 0.5, f64::from(face.lens.height) + 0.5);
+        if (ahead > 0.0) & (x >= -0.5) & (x <= right) & (y >= -0.5) & (y <= bottom) {
+            self.texel[i] = [(x + 0.5) as i32 - 1, (y + 0.5) as i32 - 1];
+            self.ids[i] = face.square(self.texel[i][0], self.texel[i][1]);
+            self.face[i] = Some(face);
+        }
+    }
+
+    /// Tells whether the light sees more than one triangle around a point.
+    #[inline(always)]
+    pub(crate) fn see_more_than(&self, i: usize, triangle: u32) -> bool {
+        self.ids[i].iter().any(|&id| (id != NO_TRIANGLE) & (id != triangle))
+    }
 }
 
 /// Edge of the maps of each kind of light.
@@ -151,41 +185,48 @@ impl Shadows {
         (tiles * TILE_PIXELS * 4 + self.planes.len() * size_of::<Plane>()) as u64
     }
 
-    /// Tells whether something stands between a point and a light.
-    #[inline]
-    pub(crate) fn is_blocked(&self, scene: &Scene, model: &Model, lamp: usize, sight: &Sight) -> bool {
-        let map = &self.maps[lamp];
-        let face = match map.faces.len() {
-            0 => return false,
-            1 => &map.faces[0],
-            _ => &map.faces[cube_face(sight.place - map.faces[0].lens.origin)],
-        };
-        let (x, y, ahead) = face.lens.place(sight.place - face.lens.origin);
-        let seen = ahead > 0.0
-            && (-0.5..=f64::from(face.lens.width) + 0.5).contains(&x)
-            && (-0.5..=f64::from(face.lens.height) + 0.5).contains(&y);
-        if !seen {
-            return false;
+    /// Looks points up in the map of a light. `origin` is what the places are relative to.
+    #[inline(always)]
+    pub(crate) fn look(
+        &self,
+        lamp: usize,
+        places: &[DVec3x8; OCTETS],
+        origin: DVec3,
+        wanted: &[bool; BATCH],
+    ) -> Looks<'_> {
+        let mut looks = Looks::none();
+        let faces = &self.maps[lamp].faces[..];
+        let Some(first) = faces.first() else { return looks };
+        for (o, places) in places.iter().enumerate() {
+            let places = *places + DVec3x8::splat(origin - self.origin);
+            let [x, y, ahead] = first.lens.places(places - DVec3x8::splat(first.lens.origin));
+            for lane in (0..LANES).filter(|lane| wanted[o * LANES + lane]) {
+                let i = o * LANES + lane;
+                if faces.len() == 1 {
+                    looks.look(i, first, x.0[lane], y.0[lane], ahead.0[lane]);
+                } else {
+                    let place = places.get(lane);
+                    let face = &faces[cube_face(place - first.lens.origin)];
+                    let (x, y, ahead) = face.lens.place(place - face.lens.origin);
+                    looks.look(i, face, x, y, ahead);
+                }
+            }
         }
-        // The texels whose centers are the corners of the square around the place.
-        let (column, row) = ((x + 0.5) as i32 - 1, (y + 0.5) as i32 - 1);
-        let ids = face.square(column, row);
-        if ids.iter().all(|&id| id == NO_TRIANGLE || id == sight.triangle) {
-            return false;
-        }
-        self.is_blocked_by(scene, model, face, (column, row), &ids, sight)
+        looks
     }
 
-    /// Tells whether one of the triangles at four texels stands in between.
-    fn is_blocked_by(
+    /// Tells whether one of the triangles at the texels around a point stands between it and the light.
+    pub(crate) fn is_blocked(
         &self,
         scene: &Scene,
         model: &Model,
-        face: &MapFace,
-        (column, row): (i32, i32),
-        ids: &[u32; 4],
+        looks: &Looks<'_>,
+        i: usize,
         sight: &Sight,
     ) -> bool {
+        let (Some(face), [column, row], ids) = (looks.face[i], looks.texel[i], &looks.ids[i]) else {
+            return false;
+        };
         let mut all_in_front = true;
         let (mut last, mut last_before) = (NO_TRIANGLE, false);
         for (i, &id) in ids.iter().enumerate() {
@@ -210,8 +251,8 @@ impl Shadows {
     fn is_before(&self, id: u32, sight: &Sight) -> bool {
         let plane = &self.planes[id as usize];
         let gap = plane.offset - plane.normal.dot(sight.place);
-        let along = gap / plane.normal.dot(sight.to_light);
-        gap.abs() > self.tolerance && along > 0.0 && along < sight.distance
+        let slope = plane.normal.dot(sight.to_light);
+        gap.abs() > self.tolerance && gap * slope > 0.0 && gap.abs() < slope.abs() * sight.distance
     }
 
     /// Tells whether the point of a triangle at a texel's center is on the light's side of the plane of the
@@ -244,13 +285,14 @@ impl Shadows {
             return true;
         }
         let lens = Lens::parallel(self.origin + sight.place, looking(sight.to_light), [1.0; 2], [0; 2]);
-        Resolver::new(scene, model, &lens).resolve(id, &lens.ray(0.0, 0.0), Ask::Color).opacity > 0.0
+        let place = Place { scene, model, lens: &lens, x: 0.0, y: 0.0 };
+        place.is_solid(&Face::new(scene, model, &lens, id))
     }
 }
 
 impl MapFace {
     /// Returns the triangles at a texel, its right neighbor, and the two below.
-    #[inline]
+    #[inline(always)]
     fn square(&self, column: i32, row: i32) -> [u32; 4] {
         let (x, y) = (column as u32, row as u32);
         let (in_tile_x, in_tile_y) = (x % TILE_WIDTH, y % TILE_HEIGHT);
@@ -347,13 +389,11 @@ fn draw(
     for_each_mut(threads, &mut tiles, 4, &|index, tile| {
         let area = grid.area(index);
         let mut buffer = TileBuffer::new();
-        for record in bins.solid(index) {
-            buffer.draw(record, &area);
-        }
-        let mut resolver = Resolver::new(scene, pass.model, pass.lens);
+        buffer.draw(bins.solid(index), &area);
         for record in bins.layers(index) {
+            let face = Face::new(scene, pass.model, pass.lens, record.id);
             buffer.draw_where(record, &area, |x, y| {
-                resolver.resolve(record.id, &pass.lens.ray(x, y), Ask::Color).opacity > 0.0
+                Place { scene, model: pass.model, lens: pass.lens, x, y }.is_solid(&face)
             });
         }
         *tile = buffer.id;
