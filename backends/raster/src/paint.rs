@@ -8,8 +8,9 @@ use crate::lens::Lens;
 use crate::light::{Illumination, Wants};
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH, TileArea, TileBuffer, TileGrid};
 use glam::Vec3;
+use polyptych_core::camera::RowDirections;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
-use polyptych_core::lanes::{I32x8, LANES, Vec3x8};
+use polyptych_core::lanes::LANES;
 use polyptych_core::seam::{Cancelled, Control};
 use polyptych_core::shade::fogged;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -165,18 +166,12 @@ impl<'a> Painter<'a> {
         let pixels = from..from + area.width as usize;
         let nothing = Pixel::background(Vec3::ZERO);
         if !band.color.is_empty() {
-            // The heights of the directions alone, in the precision of colors: most pixels see nothing else.
             let place = (f64::from(area.x) + 0.5, f64::from(area.y as u32 + row) + 0.5);
             let first = self.lens.line(place.0, place.1).1;
             let step = (self.lens.line(place.0 + 1.0, place.1).1 - first).as_vec3();
-            let (first, step) = (Vec3x8::splat(first.as_vec3()), Vec3x8::splat(step));
-            let background = self.light.scene.environment.background.gradient();
-            for (chunk, colors) in band.color[pixels.clone()].chunks_mut(LANES).enumerate() {
-                let column = I32x8::count_from((chunk * LANES) as i32).to_f64().round();
-                let direction = first + step.scaled(column);
-                let seen = background.colors(direction.y / direction.length()).finite();
-                colors.iter_mut().enumerate().for_each(|(lane, color)| *color = seen.get(lane));
-            }
+            let directions = RowDirections { first: first.as_vec3(), step };
+            let background = &self.light.scene.environment.background;
+            directions.fill(background, 0, &mut band.color[pixels.clone()]);
         }
         fn fill<T: Copy>(plane: &mut [T], pixels: std::ops::Range<usize>, value: T) {
             if !plane.is_empty() {

@@ -23,7 +23,7 @@ use crate::light::Lamp;
 use crate::model::{Class, Model, Role};
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileBuffer, TileGrid};
 use crate::transform::{ScreenVertex, transform};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 use polyptych_core::lanes::{DVec3x8, LANES};
 use polyptych_core::math::{Aabb, orthonormal_basis};
 use polyptych_core::parallel::{Threads, for_each_mut};
@@ -46,7 +46,7 @@ pub(crate) struct Shadows {
     /// One for each lamp; without faces for those that cast no shadow.
     maps: Vec<Map>,
     /// One for each triangle of the model.
-    planes: Vec<Plane>,
+    blockers: Vec<Blocker>,
     tolerance: f64,
 }
 
@@ -62,11 +62,35 @@ pub(crate) struct MapFace {
     tiles: Vec<[u32; TILE_PIXELS]>,
 }
 
-/// `normal . p = offset`.
+/// The corners of a triangle, relative to [`Shadows::origin`]: close together in memory, since lookups jump.
+/// Neighbors round a corner alike, so the way to a light finds no gap between them.
 #[derive(Clone, Copy, Default)]
+struct Blocker([Vec3; 3]);
+
+/// `normal . p = offset`.
 struct Plane {
     normal: DVec3,
     offset: f64,
+}
+
+impl Blocker {
+    fn plane(&self) -> Plane {
+        let [a, b, c] = self.0.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        Plane { normal, offset: normal.dot(a) }
+    }
+
+    /// Tells whether a line through a point passes through the triangle.
+    #[inline(always)]
+    fn is_crossed(&self, place: DVec3, direction: DVec3) -> bool {
+        let [a, b, c] = self.0;
+        let (a, b, c) = (a.as_dvec3() - place, b.as_dvec3() - place, c.as_dvec3() - place);
+        // Volumes spanned by the line and each edge, of one sign inside (edges belong to both neighbors).
+        let u = b.cross(c).dot(direction);
+        let v = c.cross(a).dot(direction);
+        let w = a.cross(b).dot(direction);
+        ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0))
+    }
 }
 
 /// The way from a point to a light.
@@ -154,8 +178,8 @@ impl Shadows {
         let origin = model.bounds.center();
         let tolerance = ON_PLANE * model.reach.max(model.bounds.radius());
         let casters = Casters::of(model, tolerance);
-        let planes = planes(model, origin, control.threads);
-        let mut shadows = Self { origin, maps: Vec::with_capacity(lamps.len()), planes, tolerance };
+        let blockers = blockers(model, origin, control.threads);
+        let mut shadows = Self { origin, maps: Vec::with_capacity(lamps.len()), blockers, tolerance };
         for lamp in lamps {
             let mut map = Map::default();
             let (bounds, left_out) = casters.of_light(model, &lamp.light.kind, lamp.cell);
@@ -182,7 +206,7 @@ impl Shadows {
     /// Returns the bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let tiles: usize = self.maps.iter().flat_map(|m| &m.faces).map(|f| f.tiles.len()).sum();
-        (tiles * TILE_PIXELS * 4 + self.planes.len() * size_of::<Plane>()) as u64
+        (tiles * TILE_PIXELS * 4 + self.blockers.len() * size_of::<Blocker>()) as u64
     }
 
     /// Looks points up in the map of a light. `origin` is what the places are relative to.
@@ -227,38 +251,38 @@ impl Shadows {
         let (Some(face), [column, row], ids) = (looks.face[i], looks.texel[i], &looks.ids[i]) else {
             return false;
         };
-        let mut all_in_front = true;
-        let (mut last, mut last_before) = (NO_TRIANGLE, false);
-        for (i, &id) in ids.iter().enumerate() {
-            if id == NO_TRIANGLE || id == sight.triangle {
-                all_in_front = false;
-                continue;
+        let foreign = |id: u32| (id != NO_TRIANGLE) & (id != sight.triangle);
+        for (i, &id) in ids.iter().enumerate().filter(|(_, id)| foreign(**id)) {
+            let is_new = !ids[..i].contains(&id);
+            let blocker = &self.blockers[id as usize];
+            if is_new
+                && blocker.is_crossed(sight.place, sight.to_light)
+                && self.is_before(&blocker.plane(), sight)
+                && self.is_solid(scene, model, id, sight)
+            {
+                return true;
             }
-            if id != last {
-                last = id;
-                last_before = self.is_before(id, sight);
-                if last_before && self.runs_through(scene, model, id, sight) {
-                    return true;
-                }
-            }
-            let texel = (f64::from(column) + 0.5 + (i % 2) as f64, f64::from(row) + 0.5 + (i / 2) as f64);
-            all_in_front = all_in_front && last_before && self.is_above(face, id, texel, sight);
         }
-        all_in_front
+        ids.iter().all(|&id| foreign(id))
+            && ids.iter().enumerate().all(|(i, &id)| {
+                let (x, y) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
+                let texel = (x + (i % 2) as f64, y + (i / 2) as f64);
+                let plane = self.blockers[id as usize].plane();
+                self.is_before(&plane, sight) && self.is_above(face, &plane, texel, sight)
+            })
     }
 
-    /// Tells whether the plane of a triangle is between the point and the light.
-    fn is_before(&self, id: u32, sight: &Sight) -> bool {
-        let plane = &self.planes[id as usize];
+    /// Tells whether a plane is between the point and the light.
+    fn is_before(&self, plane: &Plane, sight: &Sight) -> bool {
         let gap = plane.offset - plane.normal.dot(sight.place);
         let slope = plane.normal.dot(sight.to_light);
         gap.abs() > self.tolerance && gap * slope > 0.0 && gap.abs() < slope.abs() * sight.distance
     }
 
-    /// Tells whether the point of a triangle at a texel's center is on the light's side of the plane of the
+    /// Tells whether the point of a plane at a texel's center is on the light's side of the plane of the
     /// point's own triangle.
-    fn is_above(&self, face: &MapFace, id: u32, texel: (f64, f64), sight: &Sight) -> bool {
-        let (plane, own) = (&self.planes[id as usize], &self.planes[sight.triangle as usize]);
+    fn is_above(&self, face: &MapFace, plane: &Plane, texel: (f64, f64), sight: &Sight) -> bool {
+        let own = self.blockers[sight.triangle as usize].plane();
         let (start, direction) = face.lens.line(texel.0, texel.1);
         let start = start + face.lens.origin;
         let t = (plane.offset - plane.normal.dot(start)) / plane.normal.dot(direction);
@@ -266,22 +290,11 @@ impl Shadows {
         height * own.normal.dot(sight.to_light).signum() > self.tolerance
     }
 
-    /// Tells whether the way to the light runs through a solid point of a triangle whose plane it crosses.
-    fn runs_through(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
+    /// Tells whether a triangle is no hole where the way to the light crosses it.
+    fn is_solid(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
         let (index, triangle) = model.find(id);
         let part = &model.parts[index];
-        let corners = part.corners(triangle, self.origin + sight.place);
-        // Volumes spanned by the way and each edge, of one sign inside (edges belong to both neighbors).
-        let weight = |a: DVec3, b: DVec3| a.cross(b).dot(sight.to_light);
-        let u = weight(corners[1], corners[2]);
-        let v = weight(corners[2], corners[0]);
-        let w = weight(corners[0], corners[1]);
-        let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-        if !inside {
-            return false;
-        }
-        let slot = part.mesh().slot(triangle);
-        if part.class(Role::Light, slot) == Class::Solid {
+        if part.class(Role::Light, part.mesh().slot(triangle)) == Class::Solid {
             return true;
         }
         let lens = Lens::parallel(self.origin + sight.place, looking(sight.to_light), [1.0; 2], [0; 2]);
@@ -316,18 +329,16 @@ impl MapFace {
     }
 }
 
-fn planes(model: &Model, origin: DVec3, threads: &dyn Threads) -> Vec<Plane> {
-    let mut planes = vec![Plane::default(); model.triangles as usize];
+fn blockers(model: &Model, origin: DVec3, threads: &dyn Threads) -> Vec<Blocker> {
+    let mut blockers = vec![Blocker::default(); model.triangles as usize];
     for part in &model.parts {
         let count = part.mesh().triangles.len();
-        let of_part = &mut planes[part.first_triangle as usize..][..count];
-        for_each_mut(threads, of_part, 1024, &|triangle, plane| {
-            let [a, b, c] = part.corners(triangle, origin);
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            *plane = Plane { normal, offset: normal.dot(a) };
+        let of_part = &mut blockers[part.first_triangle as usize..][..count];
+        for_each_mut(threads, of_part, 1024, &|triangle, blocker| {
+            *blocker = Blocker(part.corners(triangle, origin).map(|p| p.as_vec3()));
         });
     }
-    planes
+    blockers
 }
 
 /// Returns axes (right, up, backward) of a view along a direction.
