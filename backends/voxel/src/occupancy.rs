@@ -99,6 +99,16 @@ impl Occupancy {
         }
     }
 
+    /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells around a cell.
+    pub(crate) fn has_block(&self, cell: [u32; 3], exponent: u32) -> bool {
+        let high = child(cell, 4);
+        match exponent {
+            2 => self.middle[high] >> child(cell, 2) & 1 == 1,
+            4 => self.top >> high & 1 == 1,
+            _ => self.top != 0,
+        }
+    }
+
     /// Returns the exponent `e` of an aligned block of `2^e` cells around a cell that is empty, or nothing when
     /// the cell is marked. Only the six lowest bits of the coordinates count.
     #[inline]

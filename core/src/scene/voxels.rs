@@ -93,12 +93,13 @@ impl Voxels {
     /// Returns the first cell of a chunk.
     #[must_use]
     pub fn chunk_origin(&self, index: usize) -> [u32; 3] {
-        let [cx, cy, _] = self.chunks_per_axis.map(|c| c as usize);
+        let (cx, cy) = (self.chunks_per_axis[0] as usize, self.chunks_per_axis[1] as usize);
         [index % cx, index / cx % cy, index / (cx * cy)].map(|c| c as u32 * CHUNK)
     }
 
     /// Returns the byte of a cell; cells outside are empty.
     #[must_use]
+    #[inline]
     pub fn get(&self, x: u32, y: u32, z: u32) -> u8 {
         if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] {
             return 0;
@@ -123,8 +124,9 @@ impl Voxels {
         Arc::make_mut(cells)[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)] = value;
     }
 
+    #[inline]
     fn chunk_index(&self, x: u32, y: u32, z: u32) -> usize {
-        let [cx, cy, _] = self.chunks_per_axis.map(|c| c as usize);
+        let (cx, cy) = (self.chunks_per_axis[0] as usize, self.chunks_per_axis[1] as usize);
         ((z / CHUNK) as usize * cy + (y / CHUNK) as usize) * cx + (x / CHUNK) as usize
     }
 

@@ -72,6 +72,18 @@ impl GridRay {
         (f64::from(k) - self.origin[axis]) * self.inverse[axis]
     }
 
+    /// Returns the distance of a plane between cells as they are, not mirrored.
+    pub(crate) fn plane_of(&self, axis: usize, k: i32) -> f64 {
+        self.plane(axis, if self.flip[axis] == 0 { k } else { -k })
+    }
+
+    /// Mirrors a cell, or mirrors it back. Written out: arrays built by closures cost calls here.
+    #[inline(always)]
+    fn mirrored(&self, [x, y, z]: [i32; 3]) -> [i32; 3] {
+        [x ^ self.flip[0], y ^ self.flip[1], z ^ self.flip[2]]
+    }
+
+    #[inline]
     fn stands_still(&self, axis: usize) -> bool {
         self.direction[axis] == 0.0
     }
@@ -172,7 +184,7 @@ pub(crate) struct Walk {
 impl Walk {
     /// Begins at a moment within the grid, or later where the ray enters it. Nothing where it never does.
     pub(crate) fn begin(ray: GridRay, size: [i32; 3], moment: Moment) -> Option<Self> {
-        let low: [i32; 3] = std::array::from_fn(|a| size[a] & ray.flip[a]).map(|s: i32| -s);
+        let low = [-(size[0] & ray.flip[0]), -(size[1] & ray.flip[1]), -(size[2] & ray.flip[2])];
         let (mut start, mut entered) = (moment, None);
         for (a, &low) in low.iter().enumerate() {
             if ray.stands_still(a) {
@@ -203,7 +215,7 @@ impl Walk {
     /// Begins at the origin of the ray in a cell that is known. Nothing where it lies outside of the grid; a ray
     /// that left the grid and goes away from it never returns.
     pub(crate) fn begin_in(ray: GridRay, size: [i32; 3], cell: [i32; 3]) -> Option<Self> {
-        let cell = std::array::from_fn(|a| cell[a] ^ ray.flip[a]);
+        let cell = ray.mirrored(cell);
         let walk = Self { ray, size, cell, t: 0.0, entered: None, steps: 0 };
         walk.is_inside().then_some(walk)
     }
@@ -211,7 +223,7 @@ impl Walk {
     /// Returns the cell.
     #[inline]
     pub(crate) fn cell(&self) -> [i32; 3] {
-        std::array::from_fn(|a| self.cell[a] ^ self.ray.flip[a])
+        self.ray.mirrored(self.cell)
     }
 
     /// Counts the planes between the cell and the corner at which a ray of this direction enters: rises by one
@@ -301,7 +313,7 @@ impl Walk {
         if let Some(a) = self.entered {
             cell[a] -= 1;
         }
-        std::array::from_fn(|a| cell[a] ^ self.ray.flip[a])
+        self.ray.mirrored(cell)
     }
 }
 
