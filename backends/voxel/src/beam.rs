@@ -59,7 +59,13 @@ impl Beam {
         let directions = || bundle.directions.iter().map(|&d| map.transform_vector3(d));
         let mean: DVec3 = directions().sum();
         let [x, y, z] = mean.abs().to_array();
-        let axis = if x >= y && x >= z { 0 } else if y >= z { 1 } else { 2 };
+        let axis = if x >= y && x >= z {
+            0
+        } else if y >= z {
+            1
+        } else {
+            2
+        };
         let sign = mean[axis].signum();
         let mut slopes = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         for d in directions() {
@@ -83,8 +89,11 @@ impl Beam {
     fn section(&self, from: f64, to: f64, slack: f64) -> Option<[(f64, f64); 2]> {
         let (low, high) = (self.origins.min[self.axis], self.origins.max[self.axis]);
         // How far rays went along the axis.
-        let (a, b) =
-            if self.ascends { ((from - high).max(0.0), to - low) } else { (from - high, (to - low).min(0.0)) };
+        let (a, b) = if self.ascends {
+            ((from - high).max(0.0), to - low)
+        } else {
+            (from - high, (to - low).min(0.0))
+        };
         if a > b {
             return None;
         }
@@ -124,7 +133,13 @@ impl Beam {
     }
 
     /// Finds the first, or the last, of the finest slabs in which a marked block is touched.
-    fn slab(&self, layer: &Layer, exponent: u32, slabs: std::ops::Range<i32>, from_above: bool) -> Option<i32> {
+    fn slab(
+        &self,
+        layer: &Layer,
+        exponent: u32,
+        slabs: std::ops::Range<i32>,
+        from_above: bool,
+    ) -> Option<i32> {
         let count = slabs.len() as i32;
         for i in 0..count {
             let slab = if from_above { slabs.end - 1 - i } else { slabs.start + i };
@@ -152,9 +167,7 @@ impl Beam {
             let (low, high) = section[i];
             // Cells up to and including the last.
             let is_touched = low < last + 1.0 && high > 0.0;
-            is_touched.then(|| {
-                ((low.max(0.0) as i32) >> exponent, (high.min(last) as i32) >> exponent)
-            })
+            is_touched.then(|| ((low.max(0.0) as i32) >> exponent, (high.min(last) as i32) >> exponent))
         };
         let (Some((b0, b1)), Some((c0, c1))) = (blocks(0, b), blocks(1, c)) else { return false };
         if i64::from(b1 - b0 + 1) * i64::from(c1 - c0 + 1) > MOST_BLOCKS {

@@ -48,13 +48,7 @@ impl Tracer<'_> {
     }
 
     /// Does the same where the first surface is known; `lights` tell for some lamps what shadow rays may meet.
-    pub(crate) fn color(
-        &self,
-        ray: &Ray,
-        met: Option<Met>,
-        lights: &[Option<Reach>],
-        wants: Wants,
-    ) -> Pixel {
+    pub(crate) fn color(&self, ray: &Ray, met: Option<Met>, lights: &[Option<Reach>], wants: Wants) -> Pixel {
         self.follow(ray, Start::Eye, met, lights, wants, self.bounces, 1.0)
     }
 

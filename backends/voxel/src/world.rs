@@ -411,12 +411,7 @@ impl World {
             color,
             opacity: material.effective_opacity(opacity).min(1.0),
             lifted: position + item.normals[face] * (reach * LIFT),
-            site: Site {
-                item: index,
-                origin,
-                cell: met.cell_before,
-                is_within_solid: met.began_inside,
-            },
+            site: Site { item: index, origin, cell: met.cell_before, is_within_solid: met.began_inside },
         }
     }
 }
