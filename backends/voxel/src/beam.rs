@@ -187,7 +187,78 @@ impl Beam {
 
 impl Span {
     /// Returns the distances at which a ray enters and leaves the stretch.
+    #[inline(always)]
     pub(crate) fn distances(&self, ray: &GridRay) -> (f64, f64) {
         (ray.plane_of(self.axis, self.near), ray.plane_of(self.axis, self.far))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Chunks;
+    use crate::occupancy::Values;
+    use crate::walk::{Found, Moment, Walk};
+    use polyptych_core::parallel::OneThread;
+    use polyptych_core::scene::Voxels;
+
+    fn random(state: &mut u64) -> f64 {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        (*state >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Every ray of a beam meets its first marked cell within the span, and none where there is no span.
+    #[test]
+    fn no_ray_of_a_beam_meets_anything_outside_of_its_span() {
+        let all = Values::of(|_| true);
+        let mut state = 9;
+        let (mut empty, mut met, mut shortened) = (0, 0, 0);
+        for round in 0..8 {
+            let size = [130, 70, 90];
+            let voxels = Voxels::from_fn(size, |x, y, z| {
+                let d = DVec3::new(f64::from(x) - 60.0, f64::from(y) - 35.0, f64::from(z) - 45.0).length();
+                u8::from((20.0..21.5).contains(&d) || (x + 2 * y + 5 * z) % 3001 == round)
+            });
+            let grid = Chunks::default().grid(&voxels, all, all, &OneThread);
+            for _ in 0..100 {
+                let mut point = |scale: f64| {
+                    DVec3::new(random(&mut state), random(&mut state), random(&mut state)) * scale
+                };
+                let origin = point(300.0) - 100.0;
+                let directions: Vec<DVec3> = {
+                    let to = point(90.0) - origin;
+                    (0..4).map(|_| (to + point(12.0)).normalize_or(DVec3::X)).collect()
+                };
+                let bundle =
+                    Bundle { origins: Aabb::new(origin, origin + point(3.0)), directions: &directions };
+                let Some(beam) = Beam::of(&bundle, &DAffine3::IDENTITY) else { continue };
+                let span = beam.span(&grid.seen);
+                empty += u32::from(span.is_none());
+                for _ in 0..8 {
+                    let weights: [f64; 4] = std::array::from_fn(|_| random(&mut state));
+                    let direction: DVec3 = (0..4).map(|i| directions[i] * weights[i]).sum();
+                    let place = DVec3::new(random(&mut state), random(&mut state), random(&mut state));
+                    let from = bundle.origins.min + bundle.origins.size() * place;
+                    let ray = GridRay::new(from, direction).unwrap();
+                    let Some(mut walk) = Walk::begin(ray, grid.seen.size, Moment::START) else { continue };
+                    if walk.find_marked(&grid.seen, f64::INFINITY) == Found::Nothing {
+                        continue;
+                    }
+                    let (near, far) = span.expect("a ray met a cell").distances(&ray);
+                    assert!(near.max(0.0) <= walk.t && walk.t <= far, "{near} {} {far}", walk.t);
+                    // Begun at the span, the walk finds the same.
+                    if near > 0.0 {
+                        let mut late = Walk::begin(ray, grid.seen.size, Moment::before(near)).unwrap();
+                        assert_ne!(late.find_marked(&grid.seen, far), Found::Nothing);
+                        assert_eq!((late.cell(), late.t, late.entered), (walk.cell(), walk.t, walk.entered));
+                        shortened += u32::from(late.steps < walk.steps);
+                    }
+                    met += 1;
+                }
+            }
+        }
+        assert!(empty > 20 && met > 1000 && shortened > 200, "{empty} {met} {shortened}");
     }
 }

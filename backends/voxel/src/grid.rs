@@ -19,7 +19,7 @@ pub(crate) struct Layer {
 
 impl Layer {
     /// Returns the exponent of an empty block around a cell of the grid, or nothing when the cell is marked.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn empty_around(&self, cell: [i32; 3]) -> Option<u32> {
         let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         let chunk = |c: u32| (c / CHUNK) as usize;
@@ -61,7 +61,7 @@ impl Grid {
     pub(crate) const LONGEST: u32 = 1 << 30;
 
     /// Returns the byte of a cell.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn value(&self, cell: [i32; 3]) -> u8 {
         let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         self.voxels.get(x, y, z)

@@ -49,6 +49,7 @@ impl Tracer<'_> {
 
     /// Does the same where the first surface is known; `lights` tell for some lamps what shadow rays may meet.
     pub(crate) fn color(&self, ray: &Ray, met: Option<Met>, lights: &[Option<Reach>], wants: Wants) -> Pixel {
+        // Most rays are done with one opaque surface, or none.
         self.follow(ray, Start::Eye, met, lights, wants, self.bounces, 1.0)
     }
 
@@ -115,6 +116,7 @@ impl Tracer<'_> {
     }
 
     /// Lights a point of a surface.
+    #[inline(always)]
     fn light(&self, point: &Point<'_>, to_eye: DVec3, lights: &[Option<Reach>], wants: Wants) -> Lit {
         if !wants.color && !wants.shadow {
             return Lit { color: Vec3::ZERO, shadow: 1.0 };
@@ -172,6 +174,7 @@ fn seen(point: &Point<'_>, distance: f64, shadow: f32) -> Pixel {
     }
 }
 
+#[inline(always)]
 pub(crate) fn finite(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
 }

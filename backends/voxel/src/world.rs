@@ -159,17 +159,20 @@ impl Item {
         Self { object, grid, grid_from_world, normals, radius: thing.bounds().radius(), without_holes }
     }
 
+    #[inline(always)]
     fn grid_ray(&self, ray: &Ray) -> Option<GridRay> {
         let direction = self.grid_from_world.transform_vector3(ray.direction);
         GridRay::new(self.grid_from_world.transform_point3(ray.origin), direction)
     }
 
     /// Returns the ray that leaves a surface of this grid.
+    #[inline(always)]
     fn ray_from(&self, site: &Site, direction: DVec3) -> Option<GridRay> {
         GridRay::new(site.origin, self.grid_from_world.transform_vector3(direction))
     }
 
     /// Returns the largest number at hand for a point of this grid seen from a distance.
+    #[inline(always)]
     fn reach_of(&self, position: DVec3, t: f64) -> f64 {
         position.abs().max_element().max(t).max(self.radius)
     }
@@ -222,6 +225,7 @@ impl World {
     }
 
     /// Finds the first surface that a ray from the eye meets, among what its tile can reach.
+    #[inline(always)]
     pub(crate) fn meet_within(&self, ray: &Ray, reach: &Reach, counts: &Counts) -> Option<Met> {
         let mut best: Option<Met> = None;
         for (index, span) in reach.iter() {
@@ -260,7 +264,7 @@ impl World {
     }
 
     /// Follows a walk to the first surface behind a place; `previous` is the value of the cell before its first.
-    #[inline]
+    #[inline(always)]
     fn first_surface(
         &self,
         index: usize,
@@ -321,6 +325,7 @@ impl World {
 
     /// Tells whether anything blocks light between a surface and a distance along a ray; `reach` are the grids
     /// that it may meet, where that is known.
+    #[inline(always)]
     pub(crate) fn is_blocked(
         &self,
         ray: &Ray,
@@ -340,6 +345,7 @@ impl World {
         blocked
     }
 
+    #[inline(always)]
     fn blocks(
         &self,
         index: usize,
@@ -386,6 +392,7 @@ impl World {
     }
 
     /// Grows a box to hold the points from which shadow rays leave a surface that a ray met.
+    #[inline(always)]
     pub(crate) fn with_site(&self, sites: Aabb, ray: &Ray, met: &Met) -> Aabb {
         let position = ray.at(met.place.t);
         let lift = self.items[met.place.item as usize].reach_of(position, met.place.t) * LIFT;
@@ -393,6 +400,7 @@ impl World {
     }
 
     /// Returns what shading needs of a surface that a ray met.
+    #[inline(always)]
     pub(crate) fn point(&self, ray: &Ray, met: &Met) -> Point<'_> {
         let index = met.place.item as usize;
         let item = &self.items[index];
