@@ -1,7 +1,8 @@
 //! How does every back end draw a scene, beside the reference?
 
 use crate::framebuffer::{Channel, Channels, Framebuffer};
-use crate::metrics::{Errors, Gate, Verdict};
+use crate::metrics::{Errors, Gate, Verdict, color_rmse};
+use crate::parallel::Threads;
 use crate::scene::Scene;
 use crate::seam::{Decision, Need, Settings};
 use crate::studio::{Studio, StudioError};
@@ -127,7 +128,7 @@ pub fn compare(
         notes: scene.notes.clone(),
         width: request.need.width,
         height: request.need.height,
-        threads: crate::parallel::Threads::count(work.studio.pool()),
+        threads: work.studio.pool().count(),
         panels,
     })
 }
@@ -176,12 +177,20 @@ impl Work<'_> {
     fn panel(&mut self, backend: &str) -> Result<Panel, StudioError> {
         let mut panel = self.draw(backend)?;
         let Some(reference) = self.reference.take() else { return Ok(panel) };
-        let errors = Errors::between(&panel.picture, &reference);
         let pixels = u64::from(panel.picture.width()) * u64::from(panel.picture.height());
-        if self.studio.registry().info(backend)?.photometric {
+        let is_photometric = self.studio.registry().info(backend)?.photometric;
+        let (mut errors, mut split) = (Errors::default(), Ok(Split::default()));
+        // Comparing takes one thread; the reference draws the back end's model meanwhile.
+        let pool = self.studio.pool().clone();
+        pool.join(&mut || errors = Errors::between(&panel.picture, &reference), &mut || {
+            if is_photometric {
+                split = self.split(backend, &panel.picture, &panel.decisions, &reference);
+            }
+        });
+        if is_photometric {
             panel.gate = Some(Gate::EDGE_TOLERANT.judge(&errors, pixels));
-            panel.split = self.split(backend, &panel.picture, &panel.decisions, &errors, &reference)?;
         }
+        panel.split = split?;
         panel.errors = Some(errors);
         self.reference = Some(reference);
         Ok(panel)
@@ -193,20 +202,21 @@ impl Work<'_> {
         backend: &str,
         picture: &Framebuffer,
         decisions: &[Decision],
-        errors: &Errors,
         reference: &Framebuffer,
     ) -> Result<Split, StudioError> {
-        let total = errors.color.map(|c| c.rmse);
         let converted =
             |d: &Decision| matches!(d, Decision::Converted { .. } | Decision::Approximated { .. });
         let Some(model) = self.studio.renderer(backend)?.model() else {
             let as_given = !decisions.iter().any(converted);
-            return Ok(if as_given { Split { model: Some(0.0), method: total } } else { Split::default() });
+            return Ok(if as_given {
+                Split { model: Some(0.0), method: color_rmse(picture, reference) }
+            } else {
+                Split::default()
+            });
         };
         let need = Need { channels: Channels::COLOR, ..self.need(REFERENCE) };
         let of_model = self.studio.draw(REFERENCE, &model, &need)?.framebuffer;
-        let rmse = |a: &Framebuffer, b: &Framebuffer| Errors::between(a, b).color.map(|c| c.rmse);
-        Ok(Split { model: rmse(&of_model, reference), method: rmse(picture, &of_model) })
+        Ok(Split { model: color_rmse(&of_model, reference), method: color_rmse(picture, &of_model) })
     }
 }
 

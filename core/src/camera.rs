@@ -216,6 +216,7 @@ impl View<'_> {
     /// Returns the ray through a place of the picture in pixels: `(0, 0)` is the top left corner, the middle of
     /// the first pixel `(0.5, 0.5)`. Nothing where the projection sees nothing.
     #[must_use]
+    #[inline]
     pub fn ray(&self, x: f64, y: f64) -> Option<Ray> {
         let camera = self.camera;
         let (u, v) = (x * 2.0 / self.width - 1.0, 1.0 - y * 2.0 / self.height);
