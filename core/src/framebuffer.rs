@@ -226,16 +226,10 @@ impl Framebuffer {
         planes: Band<'static>,
         owner: Arc<dyn Any + Send + Sync>,
     ) -> Result<Self, String> {
-        let n = planes.width as usize * planes.rows as usize;
-        let lengths = [
-            planes.color.len(),
-            planes.distance.len(),
-            planes.normal.len(),
-            planes.id.len(),
-            planes.albedo.len(),
-            planes.shadow.len(),
-            planes.coverage.len(),
-        ];
+        let Band { width, rows: height, color, distance, normal, id, albedo, shadow, coverage, .. } = planes;
+        let n = width as usize * height as usize;
+        let lengths =
+            [color.len(), distance.len(), normal.len(), id.len(), albedo.len(), shadow.len(), coverage.len()];
         for (channel, length) in Channel::ALL.into_iter().zip(lengths) {
             let wanted = if channels.has(channel) { n } else { 0 };
             if length != wanted {
@@ -243,16 +237,16 @@ impl Framebuffer {
             }
         }
         Ok(Self {
-            width: planes.width,
-            height: planes.rows,
+            width,
+            height,
             channels,
-            color: Plane::Lent(planes.color),
-            distance: Plane::Lent(planes.distance),
-            normal: Plane::Lent(planes.normal),
-            id: Plane::Lent(planes.id),
-            albedo: Plane::Lent(planes.albedo),
-            shadow: Plane::Lent(planes.shadow),
-            coverage: Plane::Lent(planes.coverage),
+            color: Plane::Lent(color),
+            distance: Plane::Lent(distance),
+            normal: Plane::Lent(normal),
+            id: Plane::Lent(id),
+            albedo: Plane::Lent(albedo),
+            shadow: Plane::Lent(shadow),
+            coverage: Plane::Lent(coverage),
             _owner: Some(Owner(owner)),
         })
     }

@@ -110,9 +110,22 @@ pub(super) struct ConvertArguments {
 
 #[derive(Args, Debug)]
 pub(super) struct BackendsArguments {
+    #[command(flatten)]
+    pub(super) plugins: PluginArguments,
+    /// Print the manifest of a library, to be put beside it. This runs the library's code.
+    #[arg(long, value_name = "LIBRARY")]
+    pub(super) manifest: Option<PathBuf>,
     /// Print the list as JSON.
     #[arg(long)]
     pub(super) json: bool,
+}
+
+/// Where back ends in libraries are looked for.
+#[derive(Args, Debug, Default)]
+pub(super) struct PluginArguments {
+    /// Folder with plugins, besides those of POLYPTYCH_PLUGIN_PATH and the user's own.
+    #[arg(long, value_name = "DIR")]
+    pub(super) plugin_dir: Vec<PathBuf>,
 }
 
 /// Representations that `convert` writes.
@@ -168,6 +181,8 @@ pub(super) struct DrawArguments {
     /// Samples a pixel.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub(super) samples: Option<u32>,
+    #[command(flatten)]
+    pub(super) plugins: PluginArguments,
     #[command(flatten)]
     pub(super) view: ViewArguments,
     /// Print the result as JSON, and nothing else, on standard output.

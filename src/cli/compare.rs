@@ -13,7 +13,8 @@ const FRAMES: u32 = 5;
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     let scene = input::scene(&arguments.scene)?;
-    let mut studio = input::studio(usize::from(arguments.draw.threads.unwrap_or(0)))?;
+    let mut studio =
+        input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
     let default = ["raster", "voxel", "freeform", "stylized"];
     let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
     let mut all = backends.clone();

@@ -136,7 +136,6 @@ fn call_with_scene(
     let host = call.host();
     // SAFETY: the table's function with an instance of its own; all that it is passed lives until it returns.
     let status = unsafe { function(instance, flat, &raw const flat_need, &raw const host) };
-    drop(call);
     inside.settle(status, name, scene)
 }
 
@@ -290,7 +289,6 @@ impl PluginRenderer {
         // SAFETY: the table's function with an instance of its own; all that it is passed lives until it returns, and
         // nobody else writes the target.
         let status = unsafe { render(instance, &raw const camera, &raw const flat, &raw const host) };
-        drop(call);
         inside.settle(status, "render", &ready.handed.scene)?;
         let told = &inside.told;
         let objects = if told.decisions.is_empty() {
