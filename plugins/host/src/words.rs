@@ -57,6 +57,6 @@ mod tests {
         assert_eq!(unsafe { words(c"a\nb".as_ptr()) }, "a b");
         // SAFETY: null is allowed.
         assert_eq!(unsafe { words(std::ptr::null()) }, "");
-        assert!(std::ptr::eq(keep("rays"), keep(&"rays".to_owned())));
+        assert!(std::ptr::eq(keep("rays"), keep(&String::from("rays"))));
     }
 }
