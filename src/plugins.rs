@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use polyptych_plugin_host::{
-    Found, LogLine, Manifest, Options, PluginFactory, Refusal, Severity, discover, open, plugin_folders,
+    Found, Isolation, Limits, LogLine, Manifest, Options, PluginFactory, Refusal, Severity, discover, open,
+    plugin_folders, serve,
 };
 
 /// Adds back ends in libraries to a registry.
@@ -32,7 +33,15 @@ pub trait PluginBackends: Sized {
     ///
     /// # Errors
     /// Says in one line why the library is refused.
-    fn load(&mut self, library: impl AsRef<Path>) -> Result<String, Refusal>;
+    fn load(&mut self, library: impl AsRef<Path>) -> Result<String, Refusal> {
+        self.load_with(library, &Options::default())
+    }
+
+    /// Opens a library and adds its back end, to be run as the options say. Returns the id.
+    ///
+    /// # Errors
+    /// Says in one line why the library is refused.
+    fn load_with(&mut self, library: impl AsRef<Path>, options: &Options) -> Result<String, Refusal>;
 }
 
 impl PluginBackends for Registry {
@@ -67,9 +76,9 @@ impl PluginBackends for Registry {
         Ok(refused)
     }
 
-    fn load(&mut self, library: impl AsRef<Path>) -> Result<String, Refusal> {
+    fn load_with(&mut self, library: impl AsRef<Path>, options: &Options) -> Result<String, Refusal> {
         let library = library.as_ref();
-        let factory = PluginFactory::named(library, &Options::default())?;
+        let factory = PluginFactory::named(library, options)?;
         let id = crate::seam::BackendFactory::info(&factory).id;
         self.add(Arc::new(factory), Origin::Library(library.into()));
         Ok(id)

@@ -126,6 +126,12 @@ pub(super) struct PluginArguments {
     /// Folder with plugins, besides those of POLYPTYCH_PLUGIN_PATH and the user's own.
     #[arg(long, value_name = "DIR")]
     pub(super) plugin_dir: Vec<PathBuf>,
+    /// Run plugins in this process instead of processes of their own: for those that are trusted.
+    #[arg(long)]
+    pub(super) trust_plugins: bool,
+    /// End a plugin that gives no sign of progress for so long (30 s).
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub(super) plugin_limit: Option<u64>,
 }
 
 /// Representations that `convert` writes.

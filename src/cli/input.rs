@@ -7,13 +7,14 @@ use super::arguments::{
 use glam::DVec3;
 use polyptych::camera::{Camera, Projection};
 use polyptych::load::{LoadOptions, RawVolume, load};
-use polyptych::plugins::{LogLine, Options, PluginBackends, Refusal, Severity, plugin_folders};
+use polyptych::plugins::{Isolation, LogLine, Options, PluginBackends, Refusal, Severity, plugin_folders};
 use polyptych::scene::Scene;
 use polyptych::seam::{Need, Registry, Settings};
 use polyptych::{BuiltinBackends, Studio, builtin};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Default picture size.
 const SIZE: [u32; 2] = [960, 540];
@@ -58,7 +59,13 @@ pub(super) fn registry(arguments: &PluginArguments) -> Result<(Registry, Vec<Ref
         }
     }
     let mut registry = Registry::builtin();
-    let options = Options { log: Arc::new(print_log) };
+    let mut options = Options { log: Arc::new(print_log), ..Options::default() };
+    if let Some(limit) = arguments.plugin_limit {
+        options.limits.silence = Duration::from_secs(limit);
+    }
+    if arguments.trust_plugins {
+        options.isolation = Isolation::InProcess;
+    }
     // A folder of the environment that is not there holds no plugins.
     let folders: Vec<_> =
         plugin_folders(&arguments.plugin_dir).into_iter().filter(|folder| folder.is_dir()).collect();

@@ -5,6 +5,9 @@
 //! not take as given is converted here, by the shared converter, and the bound goes into the report.
 
 mod call;
+mod callee;
+#[cfg(target_os = "linux")]
+mod child;
 mod discover;
 mod factory;
 mod flat;
@@ -12,6 +15,7 @@ mod flat_scene;
 mod hand_over;
 mod image;
 mod library;
+mod limits;
 mod manifest;
 mod refusal;
 mod renderer;
@@ -20,8 +24,9 @@ mod words;
 
 pub use call::{LogLine, Severity};
 pub use discover::{Found, discover, plugin_folders};
-pub use factory::{Options, PluginFactory};
+pub use factory::{Isolation, Options, PluginFactory, serve};
 pub use library::open;
+pub use limits::Limits;
 pub use manifest::{Manifest, ParameterEntry};
 pub use refusal::Refusal;
 pub use table::Loaded;

@@ -152,17 +152,16 @@ impl Manifest {
     }
 
     /// Names what an opened library says otherwise.
-    pub(crate) fn differs_from(&self, loaded: &Loaded) -> Option<&'static str> {
-        let said = Self::of(loaded);
+    pub(crate) fn differs_from(&self, said: &Self) -> Option<&'static str> {
         let fields = [
             (self.id != said.id, "the id"),
             (self.version != said.version, "the version"),
             (self.abi != said.abi, "the version of the interface"),
             (self.native != said.native, "the shapes that it draws"),
             (self.accepts != said.accepts, "the shapes that it takes"),
-            (self.info().channels != loaded.info.channels, "the channels"),
+            (self.info().channels != said.info().channels, "the channels"),
             (self.photometric != said.photometric, "its colors"),
-            (self.info().parameters != loaded.info.parameters, "the parameters"),
+            (self.info().parameters != said.info().parameters, "the parameters"),
         ];
         fields.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what)
     }

@@ -37,6 +37,10 @@ pub enum Refusal {
     NoManifest { path: PathBuf },
     #[error("{}: its manifest says something else about {what}: write it anew with `polyptych backends --manifest`", .path.display())]
     OtherThanManifest { path: PathBuf, what: &'static str },
+    #[error("{}: cannot run in a process of its own: {what}", .path.display())]
+    NoChild { path: PathBuf, what: String },
+    #[error("{what}")]
+    InChild { path: PathBuf, what: String },
     #[error("{}: there is a back end `{id}` already ({of}): give it another id", .path.display())]
     IdTaken { path: PathBuf, id: String, of: String },
 }
@@ -61,6 +65,8 @@ impl Refusal {
             | Self::WrongManifest { path, .. }
             | Self::NoManifest { path }
             | Self::OtherThanManifest { path, .. }
+            | Self::NoChild { path, .. }
+            | Self::InChild { path, .. }
             | Self::IdTaken { path, .. } => path,
         }
     }
