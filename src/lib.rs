@@ -19,6 +19,7 @@ pub use polyptych_core::{camera, convert, framebuffer, load, math, metrics, para
 
 pub mod builtin;
 pub mod compare;
+pub mod conformance;
 pub mod export;
 pub mod picture;
 pub mod plugins;

@@ -26,6 +26,8 @@ pub(super) enum Command {
     Convert(ConvertArguments),
     /// List the back ends with what they draw and their parameters.
     Backends(BackendsArguments),
+    /// Check a plugin against everything that back ends promise; ends with code 4 where a promise is not kept.
+    Validate(ValidateArguments),
 }
 
 #[derive(Args, Debug)]
@@ -116,6 +118,31 @@ pub(super) struct BackendsArguments {
     #[arg(long, value_name = "LIBRARY")]
     pub(super) manifest: Option<PathBuf>,
     /// Print the list as JSON.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct ValidateArguments {
+    /// The plugin's library. This runs its code.
+    #[arg(value_name = "PLUGIN")]
+    pub(super) plugin: PathBuf,
+    /// Folder to write report.html and report.json to.
+    #[arg(short, long, value_name = "DIR", default_value = "out/validate")]
+    pub(super) output: PathBuf,
+    /// Run these checks only, in this process.
+    #[arg(long, value_name = "CHECK", value_delimiter = ',')]
+    pub(super) only: Vec<String>,
+    /// Seed of what is random.
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// End a check that takes so long.
+    #[arg(long, value_name = "SECONDS", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub(super) timeout: u64,
+    /// Run the plugin in the process of each check instead of one of its own.
+    #[arg(long)]
+    pub(super) trust_plugins: bool,
+    /// Print the report as JSON, and nothing else, on standard output.
     #[arg(long)]
     pub(super) json: bool,
 }

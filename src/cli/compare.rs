@@ -54,6 +54,13 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
             }
         }
     }
+    for (_, error) in &comparison.failures {
+        eprintln!("error: {error}");
+    }
+    if !comparison.failures.is_empty() {
+        let names: Vec<_> = comparison.failures.iter().map(|(backend, _)| backend.as_str()).collect();
+        return Err(Failure::running(format!("left out: {}", names.join(", "))));
+    }
     if arguments.gate && !comparison.all_gates_hold() {
         for panel in &comparison.panels {
             if let Some(gate) = panel.gate.as_ref().filter(|g| !g.passed) {
