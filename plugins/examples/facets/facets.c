@@ -141,9 +141,9 @@ static void add(Facets *f, const PolyptychScene *scene, uint32_t index) {
     for (int a = 0; a < 3; a++) t->center[a] = (corner[0][a] + corner[1][a] + corner[2][a]) / 3;
     uint32_t slot = mesh->slots ? mesh->slots[i] : 0;
     t->object = index;
-    if (t->material > scene->material_count) t->material = scene->material_count;
     t->order = f->triangle_count;
     t->material = o->material_count == 0 ? 0 : o->materials[slot < o->material_count ? slot : 0];
+    if (t->material > scene->material_count) t->material = scene->material_count; /* the gray one after the last */
     if (isfinite(dot(t->center, t->center))) f->triangle_count++;
   }
 }

@@ -120,10 +120,11 @@ impl Peer {
         told: &mut Told,
         mut rows: Option<&mut Rows<'_>>,
     ) -> Result<i32, RenderError> {
-        self.heap.stop().store(false, Ordering::Release);
+        let stops = control.is_cancelled();
+        self.heap.stop().store(stops, Ordering::Release);
         let Some(process) = self.process.as_mut() else { return Err(RenderError::NotPrepared) };
         let mut sign = Instant::now();
-        let mut stopped: Option<Instant> = None;
+        let mut stopped = stops.then(Instant::now);
         let mut received: Result<Option<Message>, Gone> = process.send(message).map(|()| None);
         let ended = loop {
             match received {
