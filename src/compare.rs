@@ -4,7 +4,7 @@ use crate::framebuffer::{Channel, Channels, Framebuffer};
 use crate::metrics::{Errors, Gate, Verdict, color_rmse};
 use crate::parallel::Threads;
 use crate::scene::Scene;
-use crate::seam::{Decision, Need, Settings};
+use crate::seam::{Decision, Need, Origin, Settings};
 use crate::studio::{Studio, StudioError};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -43,6 +43,8 @@ pub struct Comparison {
     pub threads: usize,
     /// The reference first, then the others.
     pub panels: Vec<Panel>,
+    /// Back ends in libraries that failed, and why: they have no panel, and the others are untouched.
+    pub failures: Vec<(String, StudioError)>,
 }
 
 /// One back end's picture.
@@ -113,14 +115,20 @@ pub fn compare(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Comparison, StudioError> {
     let mut work = Work { studio, scene, request, reference: None };
-    let mut panels = Vec::new();
+    let (mut panels, mut failures) = (Vec::new(), Vec::new());
     progress(REFERENCE);
     let ruler = work.draw(REFERENCE)?;
     work.reference = Some(ruler.picture.clone());
     panels.push(ruler);
     for backend in request.backends.iter().filter(|b| *b != REFERENCE) {
         progress(backend);
-        panels.push(work.panel(backend)?);
+        match work.panel(backend) {
+            Ok(panel) => panels.push(panel),
+            Err(error @ StudioError::Render { .. }) if work.is_plugin(backend) => {
+                failures.push((backend.clone(), error));
+            }
+            Err(error) => return Err(error),
+        }
     }
     Ok(Comparison {
         scene: scene.name.clone(),
@@ -130,6 +138,7 @@ pub fn compare(
         height: request.need.height,
         threads: work.studio.pool().count(),
         panels,
+        failures,
     })
 }
 
@@ -141,6 +150,11 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
+    fn is_plugin(&self, backend: &str) -> bool {
+        let mut all = self.studio.registry().iter();
+        all.any(|(info, origin)| info.id == backend && *origin != Origin::BuiltIn)
+    }
+
     fn need(&self, backend: &str) -> Need {
         Need {
             channels: compared_channels(),

@@ -76,6 +76,24 @@ impl WarpTable {
         Ok(Self { columns, rows, directions })
     }
 
+    /// Returns the number of columns.
+    #[must_use]
+    pub fn columns(&self) -> u32 {
+        self.columns
+    }
+
+    /// Returns the number of rows.
+    #[must_use]
+    pub fn rows(&self) -> u32 {
+        self.rows
+    }
+
+    /// Returns the directions, row by row.
+    #[must_use]
+    pub fn directions(&self) -> &[DVec3] {
+        &self.directions
+    }
+
     /// Interpolates the direction at a place of the picture, `(0, 0)` top left, `(1, 1)` bottom right.
     fn direction(&self, place: DVec2) -> Option<DVec3> {
         let grid = place * DVec2::new(f64::from(self.columns - 1), f64::from(self.rows - 1));

@@ -88,6 +88,22 @@ impl Voxels {
         grid
     }
 
+    /// Puts a grid together from [`Voxels::chunks`].
+    ///
+    /// # Errors
+    /// When the number of chunks, or of cells in one, does not fit.
+    pub fn from_chunks(size: [u32; 3], chunks: Vec<Chunk>) -> Result<Self, String> {
+        let chunks_per_axis = size.map(|s| s.div_ceil(CHUNK));
+        let count = chunks_per_axis.iter().map(|&c| u128::from(c)).product::<u128>();
+        if chunks.len() as u128 != count {
+            return Err(format!("{} chunks where {count} are needed", chunks.len()));
+        }
+        if chunks.iter().any(|c| matches!(c, Chunk::Cells(cells) if cells.len() != CHUNK_CELLS)) {
+            return Err(format!("a chunk without its {CHUNK_CELLS} cells"));
+        }
+        Ok(Self { size, chunks_per_axis, chunks })
+    }
+
     /// Returns the number of cells along each axis.
     #[must_use]
     pub fn size(&self) -> [u32; 3] {
