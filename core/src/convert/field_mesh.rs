@@ -260,7 +260,7 @@ fn contour(field: &impl Field, grid: &Grid, cells: &[[u32; 3]], threads: &dyn Th
         }
     }
     for_each_mut(threads, &mut quads, 512, &|_, (quad, halves)| {
-        *halves = split_quad(*quad, &positions, field)
+        *halves = split_quad(*quad, &positions, field);
     });
     let triangles: Vec<[u32; 3]> = quads.into_iter().flat_map(|(_, halves)| halves).collect();
     with_normals(field, &positions, &triangles, threads)
