@@ -1,9 +1,10 @@
 //! How does every back end draw a scene, beside the reference?
 
 use crate::framebuffer::{Channel, Channels, Framebuffer};
-use crate::metrics::{Errors, Gate, Verdict};
+use crate::metrics::{Errors, Gate, Verdict, color_rmse};
+use crate::parallel::Threads;
 use crate::scene::Scene;
-use crate::seam::{Decision, Need, Settings};
+use crate::seam::{Decision, Need, Origin, Settings};
 use crate::studio::{Studio, StudioError};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -42,6 +43,8 @@ pub struct Comparison {
     pub threads: usize,
     /// The reference first, then the others.
     pub panels: Vec<Panel>,
+    /// Back ends in libraries that failed, and why: they have no panel, and the others are untouched.
+    pub failures: Vec<(String, StudioError)>,
 }
 
 /// One back end's picture.
@@ -112,14 +115,20 @@ pub fn compare(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Comparison, StudioError> {
     let mut work = Work { studio, scene, request, reference: None };
-    let mut panels = Vec::new();
+    let (mut panels, mut failures) = (Vec::new(), Vec::new());
     progress(REFERENCE);
     let ruler = work.draw(REFERENCE)?;
     work.reference = Some(ruler.picture.clone());
     panels.push(ruler);
     for backend in request.backends.iter().filter(|b| *b != REFERENCE) {
         progress(backend);
-        panels.push(work.panel(backend)?);
+        match work.panel(backend) {
+            Ok(panel) => panels.push(panel),
+            Err(error @ StudioError::Render { .. }) if work.is_plugin(backend) => {
+                failures.push((backend.clone(), error));
+            }
+            Err(error) => return Err(error),
+        }
     }
     Ok(Comparison {
         scene: scene.name.clone(),
@@ -127,8 +136,9 @@ pub fn compare(
         notes: scene.notes.clone(),
         width: request.need.width,
         height: request.need.height,
-        threads: crate::parallel::Threads::count(work.studio.pool()),
+        threads: work.studio.pool().count(),
         panels,
+        failures,
     })
 }
 
@@ -140,6 +150,11 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
+    fn is_plugin(&self, backend: &str) -> bool {
+        let mut all = self.studio.registry().iter();
+        all.any(|(info, origin)| info.id == backend && *origin != Origin::BuiltIn)
+    }
+
     fn need(&self, backend: &str) -> Need {
         Need {
             channels: compared_channels(),
@@ -176,12 +191,20 @@ impl Work<'_> {
     fn panel(&mut self, backend: &str) -> Result<Panel, StudioError> {
         let mut panel = self.draw(backend)?;
         let Some(reference) = self.reference.take() else { return Ok(panel) };
-        let errors = Errors::between(&panel.picture, &reference);
         let pixels = u64::from(panel.picture.width()) * u64::from(panel.picture.height());
-        if self.studio.registry().info(backend)?.photometric {
+        let is_photometric = self.studio.registry().info(backend)?.photometric;
+        let (mut errors, mut split) = (Errors::default(), Ok(Split::default()));
+        // Comparing takes one thread; the reference draws the back end's model meanwhile.
+        let pool = self.studio.pool().clone();
+        pool.join(&mut || errors = Errors::between(&panel.picture, &reference), &mut || {
+            if is_photometric {
+                split = self.split(backend, &panel.picture, &panel.decisions, &reference);
+            }
+        });
+        if is_photometric {
             panel.gate = Some(Gate::EDGE_TOLERANT.judge(&errors, pixels));
-            panel.split = self.split(backend, &panel.picture, &panel.decisions, &errors, &reference)?;
         }
+        panel.split = split?;
         panel.errors = Some(errors);
         self.reference = Some(reference);
         Ok(panel)
@@ -193,20 +216,21 @@ impl Work<'_> {
         backend: &str,
         picture: &Framebuffer,
         decisions: &[Decision],
-        errors: &Errors,
         reference: &Framebuffer,
     ) -> Result<Split, StudioError> {
-        let total = errors.color.map(|c| c.rmse);
         let converted =
             |d: &Decision| matches!(d, Decision::Converted { .. } | Decision::Approximated { .. });
         let Some(model) = self.studio.renderer(backend)?.model() else {
             let as_given = !decisions.iter().any(converted);
-            return Ok(if as_given { Split { model: Some(0.0), method: total } } else { Split::default() });
+            return Ok(if as_given {
+                Split { model: Some(0.0), method: color_rmse(picture, reference) }
+            } else {
+                Split::default()
+            });
         };
         let need = Need { channels: Channels::COLOR, ..self.need(REFERENCE) };
         let of_model = self.studio.draw(REFERENCE, &model, &need)?.framebuffer;
-        let rmse = |a: &Framebuffer, b: &Framebuffer| Errors::between(a, b).color.map(|c| c.rmse);
-        Ok(Split { model: rmse(&of_model, reference), method: rmse(picture, &of_model) })
+        Ok(Split { model: color_rmse(&of_model, reference), method: color_rmse(picture, &of_model) })
     }
 }
 

@@ -175,11 +175,12 @@ fn voxel_model(
         _ => None,
     };
     if let Some(object) = only_grid {
-        let model = converter.voxels(scene, object, detail).map_err(|e| e.to_string())?;
+        let model = converter.voxels(scene, object, detail, threads).map_err(|e| e.to_string())?;
         return Ok(((*model).clone(), model.bound, Vec::new()));
     }
     let merged = Merged::of(scene, detail, converter, threads)?;
-    let model = converter.voxels(&merged.scene, merged.object(), detail).map_err(|e| e.to_string())?;
+    let model =
+        converter.voxels(&merged.scene, merged.object(), detail, threads).map_err(|e| e.to_string())?;
     Ok(((*model).clone(), merged.bound + model.bound, merged.notes))
 }
 

@@ -19,8 +19,10 @@ pub use polyptych_core::{camera, convert, framebuffer, load, math, metrics, para
 
 pub mod builtin;
 pub mod compare;
+pub mod conformance;
 pub mod export;
 pub mod picture;
+pub mod plugins;
 pub mod report;
 
 mod registry;
@@ -33,6 +35,7 @@ pub use studio::{Drawing, Studio, StudioError};
 pub mod prelude {
     pub use crate::camera::{Camera, Projection};
     pub use crate::framebuffer::{Channel, Channels, Framebuffer};
+    pub use crate::plugins::PluginBackends;
     pub use crate::scene::{
         Background, Environment, Form, FreeForm, HeightField, Light, Material, Mesh, Object, Primitive,
         Scene, Shape, Texture, Volume, Voxels,

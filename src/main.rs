@@ -3,5 +3,6 @@
 mod cli;
 
 fn main() -> std::process::ExitCode {
+    polyptych::plugins::serve();
     cli::run()
 }

@@ -50,7 +50,9 @@ fn conversions_agree_with_closed_forms_within_their_bounds() {
                 mesh.bound
             );
 
-            let voxels = converter.voxels(&scene, &object, Detail { max_resolution: 128, ..detail }).unwrap();
+            let voxels = converter
+                .voxels(&scene, &object, Detail { max_resolution: 128, ..detail }, &OneThread)
+                .unwrap();
             let cell = voxels.object_from_voxels.matrix3.determinant();
             let error = (voxels.voxels.filled() as f64 * cell - volume).abs();
             assert!(

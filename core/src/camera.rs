@@ -1,7 +1,9 @@
 //! From where the scene is seen, and how directions become pixels.
 
+use crate::lanes::{I32x8, LANES, Vec3x8};
 use crate::math::{Aabb, Ray};
-use glam::{DMat3, DVec2, DVec3};
+use crate::scene::Background;
+use glam::{DMat3, DVec2, DVec3, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -72,6 +74,24 @@ impl WarpTable {
             return Err(format!("{} directions for {columns}x{rows}", directions.len()));
         }
         Ok(Self { columns, rows, directions })
+    }
+
+    /// Returns the number of columns.
+    #[must_use]
+    pub fn columns(&self) -> u32 {
+        self.columns
+    }
+
+    /// Returns the number of rows.
+    #[must_use]
+    pub fn rows(&self) -> u32 {
+        self.rows
+    }
+
+    /// Returns the directions, row by row.
+    #[must_use]
+    pub fn directions(&self) -> &[DVec3] {
+        &self.directions
     }
 
     /// Interpolates the direction at a place of the picture, `(0, 0)` top left, `(1, 1)` bottom right.
@@ -178,10 +198,43 @@ pub struct View<'a> {
     half: f64,
 }
 
+/// Directions of rays that are affine in the column, in the precision of colors.
+#[derive(Clone, Copy, Debug)]
+pub struct RowDirections {
+    /// Of the first column; not of unit length.
+    pub first: Vec3,
+    /// What each column adds.
+    pub step: Vec3,
+}
+
+impl RowDirections {
+    /// Returns the direction at a column, of unit length.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, column: u32) -> Vec3 {
+        let direction = self.first + self.step * column as f32;
+        direction / direction.length()
+    }
+
+    /// Fills colors with what is seen of a background in directions from a column on.
+    #[inline(always)]
+    pub fn fill(&self, background: &Background, column: u32, colors: &mut [Vec3]) {
+        let (first, step) = (Vec3x8::splat(self.first), Vec3x8::splat(self.step));
+        let background = background.gradient();
+        for (chunk, colors) in colors.chunks_mut(LANES).enumerate() {
+            let columns = I32x8::count_from((column as usize + chunk * LANES) as i32).to_f64().round();
+            let direction = first + step.scaled(columns);
+            let seen = background.colors(direction.y / direction.length()).finite();
+            colors.iter_mut().enumerate().for_each(|(lane, color)| *color = seen.get(lane));
+        }
+    }
+}
+
 impl View<'_> {
     /// Returns the ray through a place of the picture in pixels: `(0, 0)` is the top left corner, the middle of
     /// the first pixel `(0.5, 0.5)`. Nothing where the projection sees nothing.
     #[must_use]
+    #[inline]
     pub fn ray(&self, x: f64, y: f64) -> Option<Ray> {
         let camera = self.camera;
         let (u, v) = (x * 2.0 / self.width - 1.0, 1.0 - y * 2.0 / self.height);
@@ -214,6 +267,25 @@ impl View<'_> {
         Some(Ray { origin: camera.eye, direction })
     }
 
+    /// Returns the directions of the rays through the centers of a row of pixels, where the projection keeps
+    /// straight lines straight.
+    #[must_use]
+    pub fn row(&self, y: u32) -> Option<RowDirections> {
+        let (camera, half) = (self.camera, self.half);
+        let v = 1.0 - (f64::from(y) + 0.5) * 2.0 / self.height;
+        let (first, step) = match &camera.projection {
+            Projection::Orthographic { .. } => (DVec3::NEG_Z, DVec3::ZERO),
+            Projection::Perspective { .. } => {
+                let wide = half * self.width / self.height;
+                let step = 2.0 * wide / self.width;
+                (DVec3::new(0.5 * step - wide, v * half, -1.0), DVec3::X * step)
+            }
+            Projection::Fisheye { .. } | Projection::Cylindrical { .. } | Projection::Warp(_) => return None,
+        };
+        let turned = |v: DVec3| (camera.world_from_camera * v).as_vec3();
+        Some(RowDirections { first: turned(first), step: turned(step) })
+    }
+
     /// Returns how large a pixel is at a distance from the eye, in meters, near the middle of the picture.
     #[must_use]
     pub fn pixel_size(&self, distance: f64) -> f64 {
@@ -233,6 +305,27 @@ mod tests {
 
     fn camera(projection: Projection) -> Camera {
         Camera::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, projection)
+    }
+
+    #[test]
+    fn rows_of_directions_are_those_of_single_rays() {
+        for projection in [Projection::Perspective { fov_y: 1.2 }, Projection::Orthographic { height: 3.0 }] {
+            let camera = Camera::look_at(DVec3::new(1.0, 2.0, 5.0), DVec3::ZERO, DVec3::Y, projection);
+            let view = camera.view(37, 23);
+            let background =
+                Background::Gradient { below: Vec3::ZERO, horizon: Vec3::splat(0.5), above: Vec3::ONE };
+            for y in [0, 11, 22] {
+                let row = view.row(y).unwrap();
+                let mut colors = [Vec3::ZERO; 37];
+                row.fill(&background, 0, &mut colors);
+                for x in 0..37 {
+                    let ray = view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).unwrap();
+                    assert!((row.at(x) - ray.direction.as_vec3()).length() < 1e-6);
+                    let truth = background.color(ray.direction);
+                    assert!((colors[x as usize] - truth).length() < 1e-6, "{x} {y}");
+                }
+            }
+        }
     }
 
     #[test]

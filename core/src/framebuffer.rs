@@ -3,6 +3,9 @@
 use crate::parallel::Threads;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
+use std::any::Any;
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 
 /// One plane of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -81,6 +84,18 @@ impl Channels {
         self.0 & !1 != 0
     }
 
+    /// Returns the set as bits: bit `i` stands for the `i`th of [`Channel::ALL`].
+    #[must_use]
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// Builds a set from bits; those that stand for no channel are ignored.
+    #[must_use]
+    pub const fn from_bits(bits: u8) -> Self {
+        Self(bits & Self::ALL.0)
+    }
+
     /// Lists the channels.
     pub fn iter(self) -> impl Iterator<Item = Channel> {
         Channel::ALL.into_iter().filter(move |&c| self.has(c))
@@ -128,13 +143,56 @@ pub struct Framebuffer {
     width: u32,
     height: u32,
     channels: Channels,
-    color: Vec<Vec3>,
-    distance: Vec<f32>,
-    normal: Vec<Vec3>,
-    id: Vec<u32>,
-    albedo: Vec<Vec3>,
-    shadow: Vec<f32>,
-    coverage: Vec<f32>,
+    color: Plane<Vec3>,
+    distance: Plane<f32>,
+    normal: Plane<Vec3>,
+    id: Plane<u32>,
+    albedo: Plane<Vec3>,
+    shadow: Plane<f32>,
+    coverage: Plane<f32>,
+    _owner: Option<Owner>,
+}
+
+/// The numbers of one channel: the framebuffer's own, or in memory that it is lent.
+#[derive(Debug)]
+enum Plane<T: 'static> {
+    Own(Vec<T>),
+    Lent(&'static mut [T]),
+}
+
+/// Keeps lent memory alive.
+#[derive(Clone)]
+struct Owner(#[expect(dead_code, reason = "it is there to be dropped")] Arc<dyn Any + Send + Sync>);
+
+impl std::fmt::Debug for Owner {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Owner")
+    }
+}
+
+impl<T: Clone> Clone for Plane<T> {
+    fn clone(&self) -> Self {
+        Self::Own(self.to_vec())
+    }
+}
+
+impl<T> Deref for Plane<T> {
+    type Target = [T];
+    fn deref(&self) -> &[T] {
+        match self {
+            Self::Own(numbers) => numbers,
+            Self::Lent(numbers) => numbers,
+        }
+    }
+}
+
+impl<T> DerefMut for Plane<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        match self {
+            Self::Own(numbers) => numbers,
+            Self::Lent(numbers) => numbers,
+        }
+    }
 }
 
 impl Framebuffer {
@@ -147,14 +205,50 @@ impl Framebuffer {
             width,
             height,
             channels,
-            color: vec![Vec3::ZERO; len(Channel::Color)],
-            distance: vec![f32::INFINITY; len(Channel::Distance)],
-            normal: vec![Vec3::ZERO; len(Channel::Normal)],
-            id: vec![0; len(Channel::Id)],
-            albedo: vec![Vec3::ZERO; len(Channel::Albedo)],
-            shadow: vec![1.0; len(Channel::Shadow)],
-            coverage: vec![0.0; len(Channel::Coverage)],
+            color: Plane::Own(vec![Vec3::ZERO; len(Channel::Color)]),
+            distance: Plane::Own(vec![f32::INFINITY; len(Channel::Distance)]),
+            normal: Plane::Own(vec![Vec3::ZERO; len(Channel::Normal)]),
+            id: Plane::Own(vec![0; len(Channel::Id)]),
+            albedo: Plane::Own(vec![Vec3::ZERO; len(Channel::Albedo)]),
+            shadow: Plane::Own(vec![1.0; len(Channel::Shadow)]),
+            coverage: Plane::Own(vec![0.0; len(Channel::Coverage)]),
+            _owner: None,
         }
+    }
+
+    /// Builds a picture whose planes lie in memory of somebody else, with what it holds. `owner` is kept as long
+    /// as the picture: the one to whom the memory belongs. A clone has planes of its own.
+    ///
+    /// # Errors
+    /// When a plane has not as many pixels as the picture, or none for a channel that is left out.
+    pub fn lent(
+        channels: Channels,
+        planes: Band<'static>,
+        owner: Arc<dyn Any + Send + Sync>,
+    ) -> Result<Self, String> {
+        let Band { width, rows: height, color, distance, normal, id, albedo, shadow, coverage, .. } = planes;
+        let n = width as usize * height as usize;
+        let lengths =
+            [color.len(), distance.len(), normal.len(), id.len(), albedo.len(), shadow.len(), coverage.len()];
+        for (channel, length) in Channel::ALL.into_iter().zip(lengths) {
+            let wanted = if channels.has(channel) { n } else { 0 };
+            if length != wanted {
+                return Err(format!("{length} pixels of {} where {wanted} are needed", channel.name()));
+            }
+        }
+        Ok(Self {
+            width,
+            height,
+            channels,
+            color: Plane::Lent(color),
+            distance: Plane::Lent(distance),
+            normal: Plane::Lent(normal),
+            id: Plane::Lent(id),
+            albedo: Plane::Lent(albedo),
+            shadow: Plane::Lent(shadow),
+            coverage: Plane::Lent(coverage),
+            _owner: Some(Owner(owner)),
+        })
     }
 
     /// Returns the number of columns.
@@ -273,7 +367,7 @@ impl Framebuffer {
         self.width == other.width
             && self.height == other.height
             && self.channels == other.channels
-            && self.id == other.id
+            && self.id() == other.id()
             && bits3(&self.color) == bits3(&other.color)
             && bits(&self.distance) == bits(&other.distance)
             && bits3(&self.normal) == bits3(&other.normal)
@@ -290,7 +384,7 @@ impl Framebuffer {
             + wild(&self.normal)
             + wild(&self.albedo)
             + self.distance.iter().filter(|d| d.is_nan() || **d < 0.0).count()
-            + self.shadow.iter().chain(&self.coverage).filter(|v| !v.is_finite()).count()
+            + self.shadow.iter().chain(self.coverage()).filter(|v| !v.is_finite()).count()
     }
 }
 

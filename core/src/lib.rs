@@ -12,6 +12,7 @@
 pub mod camera;
 pub mod convert;
 pub mod framebuffer;
+pub mod lanes;
 pub mod load;
 pub mod math;
 pub mod metrics;

@@ -26,6 +26,8 @@ pub(super) enum Command {
     Convert(ConvertArguments),
     /// List the back ends with what they draw and their parameters.
     Backends(BackendsArguments),
+    /// Check a plugin against everything that back ends promise; ends with code 4 where a promise is not kept.
+    Validate(ValidateArguments),
 }
 
 #[derive(Args, Debug)]
@@ -110,9 +112,53 @@ pub(super) struct ConvertArguments {
 
 #[derive(Args, Debug)]
 pub(super) struct BackendsArguments {
+    #[command(flatten)]
+    pub(super) plugins: PluginArguments,
+    /// Print the manifest of a library, to be put beside it. This runs the library's code.
+    #[arg(long, value_name = "LIBRARY")]
+    pub(super) manifest: Option<PathBuf>,
     /// Print the list as JSON.
     #[arg(long)]
     pub(super) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct ValidateArguments {
+    /// The plugin's library. This runs its code.
+    #[arg(value_name = "PLUGIN")]
+    pub(super) plugin: PathBuf,
+    /// Folder to write report.html and report.json to.
+    #[arg(short, long, value_name = "DIR", default_value = "out/validate")]
+    pub(super) output: PathBuf,
+    /// Run these checks only, in this process.
+    #[arg(long, value_name = "CHECK", value_delimiter = ',')]
+    pub(super) only: Vec<String>,
+    /// Seed of what is random.
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// End a check that takes so long.
+    #[arg(long, value_name = "SECONDS", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub(super) timeout: u64,
+    /// Run the plugin in the process of each check instead of one of its own.
+    #[arg(long)]
+    pub(super) trust_plugins: bool,
+    /// Print the report as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Where back ends in libraries are looked for.
+#[derive(Args, Debug, Default)]
+pub(super) struct PluginArguments {
+    /// Folder with plugins, besides those of POLYPTYCH_PLUGIN_PATH and the user's own.
+    #[arg(long, value_name = "DIR")]
+    pub(super) plugin_dir: Vec<PathBuf>,
+    /// Run plugins in this process instead of processes of their own: for those that are trusted.
+    #[arg(long)]
+    pub(super) trust_plugins: bool,
+    /// End a plugin that gives no sign of progress for so long (30 s).
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub(super) plugin_limit: Option<u64>,
 }
 
 /// Representations that `convert` writes.
@@ -168,6 +214,8 @@ pub(super) struct DrawArguments {
     /// Samples a pixel.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub(super) samples: Option<u32>,
+    #[command(flatten)]
+    pub(super) plugins: PluginArguments,
     #[command(flatten)]
     pub(super) view: ViewArguments,
     /// Print the result as JSON, and nothing else, on standard output.

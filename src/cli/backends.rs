@@ -2,19 +2,25 @@
 
 use super::arguments::BackendsArguments;
 use super::{Failure, input, print};
+use polyptych::plugins::{Manifest, Refusal, open};
 use polyptych::scene::ShapeKind;
 use polyptych::seam::{BackendInfo, Origin, Parameter, ParameterKind};
 use serde_json::{Value, json};
 
 pub(super) fn run(arguments: &BackendsArguments) -> Result<(), Failure> {
-    let studio = input::studio(1)?;
-    let list: Vec<Value> =
-        studio.registry().iter().map(|(info, origin)| backend_json(info, origin)).collect();
+    if let Some(library) = &arguments.manifest {
+        let loaded = open(library).map_err(Failure::input)?;
+        print(&Manifest::of(loaded).to_text());
+        return Ok(());
+    }
+    let (registry, refused) = input::registry(&arguments.plugins)?;
+    let mut list: Vec<Value> = registry.iter().map(|(info, origin)| backend_json(info, origin)).collect();
+    list.extend(refused.iter().map(refused_json));
     if arguments.json {
         print(&format!("{}\n", Value::Array(list)));
         return Ok(());
     }
-    for (info, origin) in studio.registry().iter() {
+    for (info, origin) in registry.iter() {
         print(&format!("{}: {} {} ({})\n", info.id, info.name, info.version, origin_text(origin)));
         let native: Vec<_> = info.native.iter().map(|k| k.name()).collect();
         print(&format!("  draws as given: {}; converts the rest\n", native.join(", ")));
@@ -25,7 +31,18 @@ pub(super) fn run(arguments: &BackendsArguments) -> Result<(), Failure> {
             print(&format!("  {} = {}{unit} ({}): {}\n", p.name, p.default, allowed(p), p.help));
         }
     }
+    for refusal in &refused {
+        print(&format!("refused: {refusal}\n"));
+    }
     Ok(())
+}
+
+fn refused_json(refusal: &Refusal) -> Value {
+    json!({
+        "id": Value::Null, "name": Value::Null, "version": Value::Null,
+        "origin": refusal.path().to_string_lossy(), "status": format!("refused: {refusal}"),
+        "shapes": {}, "channels": [], "parameters": [],
+    })
 }
 
 fn origin_text(origin: &Origin) -> String {

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 
 pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     let scene = input::scene(&arguments.scene)?;
-    let mut studio = input::studio(usize::from(arguments.draw.threads.unwrap_or(0)))?;
+    let mut studio =
+        input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
     let default = ["raster", "voxel", "freeform", "stylized"];
     let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
     let mut settings = input::settings(&arguments.draw, studio.registry(), &backends)?;

@@ -13,7 +13,8 @@ const FRAMES: u32 = 5;
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     let scene = input::scene(&arguments.scene)?;
-    let mut studio = input::studio(usize::from(arguments.draw.threads.unwrap_or(0)))?;
+    let mut studio =
+        input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
     let default = ["raster", "voxel", "freeform", "stylized"];
     let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
     let mut all = backends.clone();
@@ -52,6 +53,13 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
                 eprintln!("{}: {name}: {} {}", panel.backend, decision.word(), decision.why());
             }
         }
+    }
+    for (_, error) in &comparison.failures {
+        eprintln!("error: {error}");
+    }
+    if !comparison.failures.is_empty() {
+        let names: Vec<_> = comparison.failures.iter().map(|(backend, _)| backend.as_str()).collect();
+        return Err(Failure::running(format!("left out: {}", names.join(", "))));
     }
     if arguments.gate && !comparison.all_gates_hold() {
         for panel in &comparison.panels {

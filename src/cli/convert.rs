@@ -1,6 +1,6 @@
 //! `polyptych convert`: a scene as a model of one representation.
 
-use super::arguments::{ConvertArguments, Representation};
+use super::arguments::{ConvertArguments, PluginArguments, Representation};
 use super::{Failure, input, print};
 use polyptych::convert::Detail;
 use polyptych::export::export;
@@ -38,7 +38,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Failure> {
         }
         (None, None) => Detail { tolerance: longest / 256.0, max_resolution: 128 },
     };
-    let studio = input::studio(arguments.threads)?;
+    let studio = input::studio(arguments.threads, &PluginArguments::default())?;
     let done = export(&scene, &arguments.output, detail, studio.converter(), studio.pool())
         .map_err(Failure::running)?;
     if arguments.json {

@@ -2,17 +2,19 @@
 
 use super::Failure;
 use super::arguments::{
-    DrawArguments, ProjectionName, Quality, ReadingArguments, SceneArguments, ViewArguments,
+    DrawArguments, PluginArguments, ProjectionName, Quality, ReadingArguments, SceneArguments, ViewArguments,
 };
 use glam::DVec3;
 use polyptych::camera::{Camera, Projection};
 use polyptych::load::{LoadOptions, RawVolume, load};
+use polyptych::plugins::{Isolation, LogLine, Options, PluginBackends, Refusal, Severity, plugin_folders};
 use polyptych::scene::Scene;
 use polyptych::seam::{Need, Registry, Settings};
 use polyptych::{BuiltinBackends, Studio, builtin};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Default picture size.
 const SIZE: [u32; 2] = [960, 540];
@@ -38,9 +40,45 @@ pub(super) fn named_scene(name: &str, reading: &ReadingArguments) -> Result<Arc<
     load(Path::new(name), &options).map(Arc::new).map_err(Failure::input)
 }
 
-/// Opens a studio with the threads that were asked for.
-pub(super) fn studio(threads: usize) -> Result<Studio, Failure> {
-    Studio::new(Registry::builtin(), threads).map_err(Failure::running)
+/// Opens a studio with the threads that were asked for, the built-in back ends and the plugins. What is refused is
+/// told on standard error.
+pub(super) fn studio(threads: usize, arguments: &PluginArguments) -> Result<Studio, Failure> {
+    let (registry, refused) = registry(arguments)?;
+    for refusal in refused {
+        eprintln!("warning: plugin refused: {refusal}");
+    }
+    Studio::new(registry, threads).map_err(Failure::running)
+}
+
+/// Returns the built-in back ends and the plugins, and what was refused.
+pub(super) fn registry(arguments: &PluginArguments) -> Result<(Registry, Vec<Refusal>), Failure> {
+    for folder in &arguments.plugin_dir {
+        if !folder.is_dir() {
+            let folder = folder.display();
+            return Err(Failure::wrong_use(format!("--plugin-dir {folder}: there is no such folder")));
+        }
+    }
+    let mut registry = Registry::builtin();
+    let mut options = Options { log: Arc::new(print_log), ..Options::default() };
+    if let Some(limit) = arguments.plugin_limit {
+        options.limits.silence = Duration::from_secs(limit);
+    }
+    if arguments.trust_plugins {
+        options.isolation = Isolation::InProcess;
+    }
+    // A folder of the environment that is not there holds no plugins.
+    let folders: Vec<_> =
+        plugin_folders(&arguments.plugin_dir).into_iter().filter(|folder| folder.is_dir()).collect();
+    let refused = registry.add_plugins(&folders, &options).map_err(Failure::input)?;
+    Ok((registry, refused))
+}
+
+fn print_log(line: LogLine) {
+    if line.severity > Severity::Debug {
+        let LogLine { backend, severity, object, text } = line;
+        let object = object.map_or(String::new(), |o| format!("object {o}: "));
+        eprintln!("{backend}: {severity:?}: {object}{text}");
+    }
 }
 
 /// Returns the need of a picture, without settings.

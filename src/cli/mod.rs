@@ -8,6 +8,7 @@ mod convert;
 mod input;
 mod plan;
 mod render;
+mod validate;
 
 use arguments::{Arguments, Command};
 use clap::Parser as _;
@@ -58,6 +59,7 @@ pub(crate) fn run() -> ExitCode {
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Convert(arguments)) => convert::run(&arguments),
         Some(Command::Backends(arguments)) => backends::run(&arguments),
+        Some(Command::Validate(arguments)) => validate::run(&arguments),
     };
     let (message, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let scene = input::scene(&arguments.scene)?;
-    let mut studio = input::studio(1)?;
+    let mut studio = input::studio(1, &arguments.draw.plugins)?;
     let default = ["reference", "raster", "voxel", "freeform", "stylized"];
     let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
     let mut settings = input::settings(&arguments.draw, studio.registry(), &backends)?;

@@ -10,7 +10,8 @@ use serde_json::json;
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let scene = input::scene(&arguments.scene)?;
-    let mut studio = input::studio(usize::from(arguments.draw.threads.unwrap_or(0)))?;
+    let mut studio =
+        input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
     let backends = input::backends(&arguments.draw, studio.registry(), &["raster"])?;
     let [backend] = &backends[..] else {
         return Err(Failure::wrong_use("render draws with one back end: use `compare` for several"));

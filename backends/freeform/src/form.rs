@@ -72,38 +72,19 @@ impl FormBody {
         let FormScratch { active, leaves, stack, alive, values } = scratch;
         let center = self.bounds.center();
         for packet in alive.chunks(LANES) {
-            let lane = |i: usize| packet[i.min(packet.len() - 1)];
-            let rays = std::array::from_fn(|i| (lane(i).origin, lane(i).direction));
-            // Around the point nearest to the form's middle the polynomials have small coefficients.
-            let stretch: [(f64, f64); LANES] =
-                std::array::from_fn(|i| (lane(i).near.max(near), lane(i).far.min(far)));
-            let around: [f64; LANES] = std::array::from_fn(|i| {
-                let (o, d) = rays[i];
-                let t = (center - o).dot(d) / d.length_squared();
-                t.max(stretch[i].0).min(stretch[i].1)
-            });
-            let from: [f64; LANES] = std::array::from_fn(|i| stretch[i].0 - around[i]);
-            let to: [f64; LANES] = std::array::from_fn(|i| stretch[i].1 - around[i]);
-            let reach = std::array::from_fn(|i| from[i].abs().max(to[i].abs()));
+            let rays = RayPacket::new(packet, center, near, far);
             for &step in &active.steps {
                 if let Step::Leaf(leaf) = step {
-                    let quadric = &self.program.leaves[leaf as usize];
-                    leaves[leaf as usize] = ray_quadric(quadric, &rays, &around, &reach);
+                    leaves[leaf as usize] = rays.quadric(&self.program.leaves[leaf as usize]);
                 }
             }
-            let open =
-                Mask(std::array::from_fn(
-                    |i| {
-                        if i < packet.len() && from[i] <= to[i] { u32::MAX } else { 0 }
-                    },
-                ));
-            let (from, to) = (Lanes(from.map(|v| v as f32)), Lanes(to.map(|v| v as f32)));
-            let (found, root) = first_roots(&active.steps, leaves, from, to, open, crossing, stack);
+            let (from, to) = rays.stretch();
+            let (found, root) = first_roots(&active.steps, leaves, from, to, rays.open, crossing, stack);
             for (i, alive) in packet.iter().enumerate() {
                 if !found.has(i) {
                     continue;
                 }
-                let t = around[i] + f64::from(root.0[i]);
+                let t = rays.around[i] + f64::from(root.0[i]);
                 let (t, normal) = match crossing {
                     Crossing::Any => self.polish(alive, t, &active.steps, values),
                     // What blocks light is not looked at.
@@ -177,29 +158,117 @@ impl FormBody {
     }
 }
 
-/// Returns a quadric along eight rays, as a polynomial in the distance from `around`, and a bound on the rounding
-/// error of evaluating it up to `reach` away.
-pub(crate) fn ray_quadric(
-    q: &Quadric,
-    rays: &[(DVec3, DVec3); LANES],
-    around: &[f64; LANES],
-    reach: &[f64; LANES],
-) -> RayQuadric {
-    let [qa, qb, qc, qd, qe, qf, ..] = q.0;
-    let mut out = RayQuadric { a: Lanes::ZERO, b: Lanes::ZERO, c: Lanes::ZERO, error: Lanes::ZERO };
-    for i in 0..LANES {
-        let (o, d) = rays[i];
-        let p = o + d * around[i];
-        let a = d.x * (qa * d.x + qd * d.y + qe * d.z) + d.y * (qb * d.y + qf * d.z) + qc * d.z * d.z;
-        let b = q.gradient(p).dot(d);
-        let c = q.value(p);
-        // Three roundings of single precision on each term, doubled.
-        let error =
-            (a.abs() * reach[i] * reach[i] + b.abs() * reach[i] + c.abs()) * 6.0 * f64::from(f32::EPSILON);
-        out.a.0[i] = a as f32;
-        out.b.0[i] = b as f32;
-        out.c.0[i] = c as f32;
-        out.error.0[i] = error as f32;
+/// Eight rays in double precision, one array for each number.
+pub(crate) struct RayPacket {
+    /// Points around which polynomials are taken.
+    points: [[f64; LANES]; 3],
+    directions: [[f64; LANES]; 3],
+    /// Distances of those points.
+    around: [f64; LANES],
+    from: [f64; LANES],
+    to: [f64; LANES],
+    /// How far from the points the polynomials are looked at.
+    reach: [f64; LANES],
+    open: Mask,
+}
+
+impl RayPacket {
+    /// Gathers up to eight rays between two distances; lanes beyond the last repeat it and are closed.
+    #[inline]
+    fn new(packet: &[Alive], center: DVec3, near: f64, far: f64) -> Self {
+        let mut out = Self::EMPTY;
+        for i in 0..LANES {
+            let ray = &packet[i.min(packet.len() - 1)];
+            let (near, far) = (ray.near.max(near), ray.far.min(far));
+            // Around the point nearest to the form's middle the polynomials have small coefficients.
+            let nearest = (center - ray.origin).dot(ray.direction) / ray.direction.length_squared();
+            let around = nearest.max(near).min(far);
+            out.set(i, ray.origin, ray.direction, around, near - around, far - around);
+            out.open.0[i] = if i < packet.len() && near <= far { u32::MAX } else { 0 };
+        }
+        out
     }
-    out
+
+    const EMPTY: Self = Self {
+        points: [[0.0; LANES]; 3],
+        directions: [[0.0; LANES]; 3],
+        around: [0.0; LANES],
+        from: [0.0; LANES],
+        to: [0.0; LANES],
+        reach: [0.0; LANES],
+        open: Mask::NONE,
+    };
+
+    #[inline]
+    fn set(&mut self, i: usize, origin: DVec3, direction: DVec3, around: f64, from: f64, to: f64) {
+        let p = origin + direction * around;
+        for a in 0..3 {
+            self.points[a][i] = p[a];
+            self.directions[a][i] = direction[a];
+        }
+        (self.around[i], self.from[i], self.to[i]) = (around, from, to);
+        self.reach[i] = from.abs().max(to.abs());
+    }
+
+    /// Gathers rays that are looked at up to `reach` around one distance.
+    #[cfg(test)]
+    pub(crate) fn around(rays: &[(DVec3, DVec3); LANES], around: f64, reach: f64) -> Self {
+        let mut out = Self::EMPTY;
+        for (i, &(origin, direction)) in rays.iter().enumerate() {
+            out.set(i, origin, direction, around, -reach, reach);
+        }
+        out
+    }
+
+    fn stretch(&self) -> (Lanes, Lanes) {
+        let (mut from, mut to) = (Lanes::ZERO, Lanes::ZERO);
+        for i in 0..LANES {
+            (from.0[i], to.0[i]) = (self.from[i] as f32, self.to[i] as f32);
+        }
+        (from, to)
+    }
+
+    /// Returns a quadric along the rays, as polynomials in the distance from their points, with bounds on the
+    /// rounding error of evaluating them.
+    pub(crate) fn quadric(&self, q: &Quadric) -> RayQuadric {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.quadric_avx2(q) };
+        }
+        self.quadric_along(q)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn quadric_avx2(&self, q: &Quadric) -> RayQuadric {
+        self.quadric_along(q)
+    }
+
+    #[inline(always)]
+    fn quadric_along(&self, q: &Quadric) -> RayQuadric {
+        let [qa, qb, qc, qd, qe, qf, qg, qh, qi, qk] = q.0;
+        let mut out = RayQuadric { a: Lanes::ZERO, b: Lanes::ZERO, c: Lanes::ZERO, error: Lanes::ZERO };
+        let ([px, py, pz], [dx, dy, dz]) = (&self.points, &self.directions);
+        for i in 0..LANES {
+            let (x, y, z, u, v, w) = (px[i], py[i], pz[i], dx[i], dy[i], dz[i]);
+            let a = u * (qa * u + qd * v + qe * w) + v * (qb * v + qf * w) + qc * w * w;
+            let b = (2.0 * qa * x + qd * y + qe * z + qg) * u
+                + (2.0 * qb * y + qd * x + qf * z + qh) * v
+                + (2.0 * qc * z + qe * x + qf * y + qi) * w;
+            let c = x * (qa * x + qd * y + qe * z + qg) + y * (qb * y + qf * z + qh) + z * (qc * z + qi) + qk;
+            // Three roundings of single precision on each term, doubled.
+            let reach = self.reach[i];
+            let error = (a.abs() * reach * reach + b.abs() * reach + c.abs()) * 6.0 * f64::from(f32::EPSILON);
+            out.a.0[i] = a as f32;
+            out.b.0[i] = b as f32;
+            out.c.0[i] = c as f32;
+            out.error.0[i] = error as f32;
+        }
+        out
+    }
 }

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use polyptych_core::camera::View;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Pixel};
 use polyptych_core::math::Aabb;
-use polyptych_core::scene::Shape;
+use polyptych_core::scene::{Arriving, Shape};
 use polyptych_core::seam::Control;
 use polyptych_core::shade::{Surface, facing, fogged, turned_away};
 
@@ -44,6 +44,8 @@ struct Lighting {
     shaded: Vec<Shaded>,
     shadow_rays: Bundle,
     shadow_of: Vec<u32>,
+    /// What would arrive along each shadow ray.
+    arriving: Vec<Arriving>,
     blocked: Vec<Hit>,
 }
 
@@ -136,6 +138,10 @@ impl FrameDrawing<'_> {
 
     /// Gathers see-through surfaces and volumes in front of the opaque ones, layer by layer.
     fn look_through(&self, scratch: &mut Scratch) {
+        // Most scenes have nothing of the kind: no cone is needed to tell.
+        if !self.world.bodies.iter().any(|b| b.see_through || b.is_volume()) {
+            return;
+        }
         let cone = scratch.primary.cone();
         let near = |b: &&crate::world::Body| cone.is_none_or(|c| c.touches(b.center, b.radius));
         let layered = self.world.bodies.iter().filter(near).any(|b| b.see_through && !b.is_volume());
@@ -326,6 +332,7 @@ impl FrameDrawing<'_> {
         let scene = &self.world.scene;
         lit.shadow_rays.rays.clear();
         lit.shadow_of.clear();
+        lit.arriving.clear();
         for (i, hit) in hits.iter().enumerate() {
             if !hit.is_some() {
                 continue;
@@ -342,6 +349,7 @@ impl FrameDrawing<'_> {
             let (origin, direction) = (shaded.position, arriving.to_light);
             lit.shadow_rays.rays.push(Stretch { origin, direction, near, far: arriving.distance });
             lit.shadow_of.push(i as u32);
+            lit.arriving.push(arriving);
         }
         lit.blocked.clear();
         lit.blocked.extend(lit.shadow_rays.rays.iter().map(|r| Hit::nothing(r.far)));
@@ -359,25 +367,22 @@ impl FrameDrawing<'_> {
                 }
             }
         }
-        for (&i, blocked) in lit.shadow_of.iter().zip(&lit.blocked) {
+        for ((&i, blocked), arriving) in lit.shadow_of.iter().zip(&lit.blocked).zip(&lit.arriving) {
             let shaded = &mut lit.shaded[i as usize];
             if blocked.is_some() {
                 shaded.dark += 1;
                 continue;
             }
-            if let Some(arriving) = light.arriving(shaded.position) {
-                let (ray, hit) = (&bundle.rays[i as usize], &hits[i as usize]);
-                let body = &self.world.bodies[hit.body as usize];
-                let material = body.material_at(scene, shaded.position);
-                let surface = Surface {
-                    material,
-                    color: shaded.albedo,
-                    normal: shaded.normal.as_vec3(),
-                    to_eye: -ray.direction.as_vec3(),
-                };
-                let model = scene.environment.lighting;
-                shaded.color += surface.lit_by(model, arriving.to_light.as_vec3(), arriving.radiance);
-            }
+            let (ray, hit) = (&bundle.rays[i as usize], &hits[i as usize]);
+            let body = &self.world.bodies[hit.body as usize];
+            let surface = Surface {
+                material: body.material_at(scene, shaded.position),
+                color: shaded.albedo,
+                normal: shaded.normal.as_vec3(),
+                to_eye: -ray.direction.as_vec3(),
+            };
+            let model = scene.environment.lighting;
+            shaded.color += surface.lit_by(model, arriving.to_light.as_vec3(), arriving.radiance);
         }
     }
 }

@@ -1,8 +1,18 @@
 //! Eight numbers at once, in plain arrays: the compiler turns them into the widest registers that a kernel may
 //! use, and into the same bytes whatever the width.
 
-use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
+
+/// Fills eight lanes. A loop and no closure: a call that is not inlined would be made once for each lane.
+macro_rules! lanes {
+    ($zero:expr, $i:ident => $value:expr) => {{
+        let mut out = [$zero; LANES];
+        for ($i, lane) in out.iter_mut().enumerate() {
+            *lane = $value;
+        }
+        out
+    }};
+}
 
 /// How many rays a packet holds.
 pub(crate) const LANES: usize = 8;
@@ -24,27 +34,27 @@ impl Lanes {
     }
     #[inline(always)]
     pub(crate) fn min(self, other: Self) -> Self {
-        Self(from_fn(|i| if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(0.0, i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
     }
     #[inline(always)]
     pub(crate) fn max(self, other: Self) -> Self {
-        Self(from_fn(|i| if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(0.0, i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
     }
     #[inline(always)]
     pub(crate) fn abs(self) -> Self {
-        Self(self.0.map(f32::abs))
+        Self(lanes!(0.0, i => self.0[i].abs()))
     }
     #[inline(always)]
     pub(crate) fn over(self, other: Self) -> Self {
-        Self(from_fn(|i| self.0[i] / other.0[i]))
+        Self(lanes!(0.0, i => self.0[i] / other.0[i]))
     }
     #[inline(always)]
     pub(crate) fn above(self, other: Self) -> Mask {
-        Mask(from_fn(|i| if self.0[i] > other.0[i] { u32::MAX } else { 0 }))
+        Mask(lanes!(0, i => if self.0[i] > other.0[i] { u32::MAX } else { 0 }))
     }
     #[inline(always)]
     pub(crate) fn at_least(self, other: Self) -> Mask {
-        Mask(from_fn(|i| if self.0[i] >= other.0[i] { u32::MAX } else { 0 }))
+        Mask(lanes!(0, i => if self.0[i] >= other.0[i] { u32::MAX } else { 0 }))
     }
 }
 
@@ -53,7 +63,13 @@ impl Mask {
 
     #[inline(always)]
     pub(crate) fn any(self) -> bool {
-        self.0.iter().fold(0, |a, b| a | b) != 0
+        {
+            let mut all = 0;
+            for lane in self.0 {
+                all |= lane;
+            }
+            all != 0
+        }
     }
     #[inline(always)]
     pub(crate) fn has(self, lane: usize) -> bool {
@@ -62,7 +78,7 @@ impl Mask {
     /// Takes `yes` where the mask is set, else `no`.
     #[inline(always)]
     pub(crate) fn pick(self, yes: Lanes, no: Lanes) -> Lanes {
-        Lanes(from_fn(|i| {
+        Lanes(lanes!(0.0, i => {
             f32::from_bits((yes.0[i].to_bits() & self.0[i]) | (no.0[i].to_bits() & !self.0[i]))
         }))
     }
@@ -74,7 +90,7 @@ macro_rules! lanewise {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self(from_fn(|i| self.0[i] $op other.0[i]))
+                Self(lanes!(0.0, i => self.0[i] $op other.0[i]))
             }
         }
     };
@@ -87,7 +103,7 @@ impl Neg for Lanes {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|v| -v))
+        Self(lanes!(0.0, i => -self.0[i]))
     }
 }
 
@@ -95,20 +111,20 @@ impl BitAnd for Mask {
     type Output = Self;
     #[inline(always)]
     fn bitand(self, other: Self) -> Self {
-        Self(from_fn(|i| self.0[i] & other.0[i]))
+        Self(lanes!(0, i => self.0[i] & other.0[i]))
     }
 }
 impl BitOr for Mask {
     type Output = Self;
     #[inline(always)]
     fn bitor(self, other: Self) -> Self {
-        Self(from_fn(|i| self.0[i] | other.0[i]))
+        Self(lanes!(0, i => self.0[i] | other.0[i]))
     }
 }
 impl Not for Mask {
     type Output = Self;
     #[inline(always)]
     fn not(self) -> Self {
-        Self(self.0.map(|v| !v))
+        Self(lanes!(0, i => !self.0[i]))
     }
 }

@@ -395,11 +395,8 @@ mod tests {
                 let origin = point().normalize_or(DVec3::X) * 3.0;
                 (origin, (point() - origin).normalize_or(DVec3::X))
             });
-            let leaves: Vec<_> = program
-                .leaves
-                .iter()
-                .map(|q| crate::form::ray_quadric(q, &rays, &[3.0; LANES], &[3.0; LANES]))
-                .collect();
+            let packet = crate::form::RayPacket::around(&rays, 3.0, 3.0);
+            let leaves: Vec<_> = program.leaves.iter().map(|q| packet.quadric(q)).collect();
             let all = Mask([u32::MAX; LANES]);
             let (hit, root) = first_roots(
                 &program.steps,

@@ -146,14 +146,15 @@ impl Run {
             let culls = pass.culls_back || (class == Class::Layer && part.one_sided_layers);
             let sides = part.sides(culls && pass.role == Role::Camera);
             let id = part.first_triangle + triangle as u32;
-            let corners = mesh.triangles[triangle].map(|i| vertices[i as usize]);
-            let (all, any) =
-                corners.iter().fold((u32::MAX, 0), |(all, any), v| (all & v.beyond, any | v.beyond));
+            let [a, b, c] = mesh.triangles[triangle];
+            let [a, b, c] = [&vertices[a as usize], &vertices[b as usize], &vertices[c as usize]];
+            let (all, any) = (a.beyond & b.beyond & c.beyond, a.beyond | b.beyond | c.beyond);
             if any & border::NOWHERE != 0 || all & border::HIDING != 0 {
                 continue;
             }
             if any & border::CLIPPING == 0 {
-                let points = corners.map(|v| ScreenPoint { x: v.x, y: v.y, depth: v.depth });
+                let point = |v: &ScreenVertex| ScreenPoint { x: v.x, y: v.y, depth: v.depth };
+                let points = [point(a), point(b), point(c)];
                 records.extend(Record::new(&points, DepthPlane::through(&points), id, sides));
             } else {
                 clip_into(records, pass.lens, &screen_from_object, mesh.corners(triangle), id, sides);

@@ -3,13 +3,13 @@
 //! All fragments of a tile are kept and sorted, so any number of layers is right whatever the order of triangles.
 
 use crate::setup::Record;
-use crate::tile::{TILE_WIDTH, TileArea, TileBuffer, for_each_span};
+use crate::tile::{TileArea, TileBuffer, for_each_span};
 
 /// A triangle on a pixel. The order of the fields is the order of drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Fragment {
     /// Pixel within the tile.
-    pixel: u32,
+    pub(crate) pixel: u32,
     /// Falls with depth: nearer fragments come first.
     far: u32,
     pub(crate) id: u32,
@@ -18,9 +18,9 @@ pub(crate) struct Fragment {
 /// Collects the fragments of a triangle that the solid surfaces of the tile do not hide.
 pub(crate) fn collect(fragments: &mut Vec<Fragment>, record: &Record, area: &TileArea, solid: &TileBuffer) {
     for_each_span(record, area, |span| {
-        let start = record.depth_at(span.x, span.y);
+        let row = record.depth_of_row(span.y);
         for i in 0..span.length {
-            let depth = record.hold(start + record.plane.by_column * i as f64);
+            let depth = record.hold(row + record.depth_of_column(span.x + i as i32));
             let pixel = span.first + i;
             let hidden =
                 depth < solid.depth[pixel] || (depth == solid.depth[pixel] && record.id > solid.id[pixel]);
@@ -34,15 +34,6 @@ pub(crate) fn collect(fragments: &mut Vec<Fragment>, record: &Record, area: &Til
 /// Sorts fragments by pixel, then from front to back, then by id.
 pub(crate) fn sort(fragments: &mut [Fragment]) {
     fragments.sort_unstable();
-}
-
-/// Takes the fragments of the next pixel off the front of a sorted list.
-pub(crate) fn take_pixel<'a>(fragments: &mut &'a [Fragment], x: u32, row: u32) -> &'a [Fragment] {
-    let pixel = row * TILE_WIDTH + x;
-    let count = fragments.iter().take_while(|f| f.pixel == pixel).count();
-    let (of_pixel, rest) = fragments.split_at(count);
-    *fragments = rest;
-    of_pixel
 }
 
 /// Maps numbers to whole numbers in the same order.

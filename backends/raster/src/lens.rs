@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::camera::{Camera, Projection};
+use polyptych_core::lanes::{DVec3x8, F64x8};
 
 /// Pixels around the picture up to which triangles are drawn unclipped. Coordinates there fit 24.8 bits for
 /// pictures of any sensible size.
@@ -67,18 +68,18 @@ pub(crate) struct ScreenFromObject {
     ahead: Row,
 }
 
-/// A ray through the picture, relative to the lens's origin.
+/// A linear function of a point along the rays of a picture: the part that differs from ray to ray, affine in
+/// column and row, and the part that all share.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PixelRay {
-    pub(crate) start: DVec3,
-    /// Not of unit length.
-    pub(crate) direction: DVec3,
-    /// Unit length.
-    pub(crate) unit: DVec3,
-    pub(crate) length: f64,
+pub(crate) struct OnRays {
+    base: f64,
+    by_column: f64,
+    by_row: f64,
+    shared: f64,
 }
 
 impl Row {
+    #[inline(always)]
     fn at(&self, p: DVec3) -> f64 {
         self.slope.dot(p) + self.offset
     }
@@ -93,8 +94,17 @@ impl Row {
 }
 
 impl Linear {
+    #[inline(always)]
     fn at(&self, x: f64, y: f64) -> DVec3 {
         self.base + self.by_column * x + self.by_row * y
+    }
+}
+
+impl Linear {
+    #[inline(always)]
+    fn at_all(&self, x: F64x8, y: F64x8) -> DVec3x8 {
+        let (right, down) = (DVec3x8::splat(self.by_column), DVec3x8::splat(self.by_row));
+        DVec3x8::splat(self.base) + right.scaled(x) + down.scaled(y)
     }
 }
 
@@ -163,7 +173,7 @@ impl Lens {
     }
 
     /// Returns column, row and distance ahead of a point relative to the origin.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn place(&self, p: DVec3) -> (f64, f64, f64) {
         let ahead = self.ahead.at(p);
         let share = match self.rays {
@@ -173,16 +183,42 @@ impl Lens {
         (self.column.at(p) * share, self.row.at(p) * share, ahead)
     }
 
-    /// Returns the ray through a place of the picture.
-    #[inline]
-    pub(crate) fn ray(&self, x: f64, y: f64) -> PixelRay {
-        let (start, direction) = self.line(x, y);
-        let length = direction.length();
-        PixelRay { start, direction, unit: direction * (1.0 / length), length }
+    /// Returns starts and directions of eight rays.
+    #[inline(always)]
+    pub(crate) fn lines(&self, x: F64x8, y: F64x8) -> (DVec3x8, DVec3x8) {
+        match self.rays {
+            Rays::Central => (DVec3x8::splat(DVec3::ZERO), self.direction.at_all(x, y)),
+            Rays::Parallel => (self.start.at_all(x, y), DVec3x8::splat(self.direction.base)),
+        }
+    }
+
+    /// Returns columns, rows and distances ahead of eight points relative to the origin.
+    #[inline(always)]
+    pub(crate) fn places(&self, p: DVec3x8) -> [F64x8; 3] {
+        let of = |r: &Row| DVec3x8::splat(r.slope).dot(p) + F64x8::splat(r.offset);
+        let (column, row, ahead) = (of(&self.column), of(&self.row), of(&self.ahead));
+        match self.rays {
+            Rays::Central => [column / ahead, row / ahead, ahead],
+            Rays::Parallel => [column, row, ahead],
+        }
+    }
+
+    /// Returns the function `slope . p` along the rays.
+    pub(crate) fn on_rays(&self, slope: DVec3) -> OnRays {
+        let (differs, shared) = match self.rays {
+            Rays::Central => (&self.direction, 0.0),
+            Rays::Parallel => (&self.start, self.direction.base.dot(slope)),
+        };
+        OnRays {
+            base: differs.base.dot(slope),
+            by_column: differs.by_column.dot(slope),
+            by_row: differs.by_row.dot(slope),
+            shared,
+        }
     }
 
     /// Returns start and direction (not of unit length) of the ray through a place of the picture.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn line(&self, x: f64, y: f64) -> (DVec3, DVec3) {
         match self.rays {
             Rays::Central => (DVec3::ZERO, self.direction.at(x, y)),
@@ -210,6 +246,18 @@ impl Lens {
         match self.rays {
             Rays::Central => 1.0 / ahead,
             Rays::Parallel => -ahead,
+        }
+    }
+}
+
+impl OnRays {
+    /// Returns the function's value at the start of a ray and its change over the ray's direction.
+    #[inline(always)]
+    pub(crate) fn at(&self, rays: Rays, x: f64, y: f64) -> (f64, f64) {
+        let own = self.base + self.by_column * x + self.by_row * y;
+        match rays {
+            Rays::Central => (self.shared, own),
+            Rays::Parallel => (own, self.shared),
         }
     }
 }
@@ -253,10 +301,14 @@ mod tests {
             let camera = camera(projection);
             let lens = Lens::of_camera(&camera, 64, 36, 1e-6).unwrap();
             for (x, y) in [(0.5, 0.5), (32.0, 18.0), (63.5, 7.25)] {
-                let (ray, truth) = (lens.ray(x, y), camera.view(64, 36).ray(x, y).unwrap());
-                assert!((ray.unit - truth.direction).length() < 1e-14);
-                assert!((ray.start + lens.origin - truth.origin).length() < 1e-14);
-                let (column, row, ahead) = lens.place(ray.start + ray.direction * 2.5);
+                let ((start, direction), truth) = (lens.line(x, y), camera.view(64, 36).ray(x, y).unwrap());
+                assert!((direction.normalize() - truth.direction).length() < 1e-14);
+                assert!((start + lens.origin - truth.origin).length() < 1e-14);
+                let slope = DVec3::new(0.3, -0.7, 1.1);
+                let (at_start, change) = lens.on_rays(slope).at(lens.rays, x, y);
+                assert!((at_start - slope.dot(start)).abs() < 1e-14);
+                assert!((change - slope.dot(direction)).abs() < 1e-14);
+                let (column, row, ahead) = lens.place(start + direction * 2.5);
                 assert!((column - x).abs() < 1e-12 && (row - y).abs() < 1e-12 && ahead > 0.0);
             }
         }

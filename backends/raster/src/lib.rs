@@ -12,8 +12,9 @@
 //!  bin        records sorted into tiles of 64x32 pixels
 //!  tile       spans of covered pixels; nearest triangle of each: the visibility buffer
 //!  layers     fragments of see-through triangles, sorted per pixel
-//!  resolve    ray meets the triangle's plane: distance, normals, texture with its mip level
-//!  light      the lighting equation of the core, with shadows
+//!  face       a visible triangle set up once a tile: where rays meet it, normals, texture with its mip level
+//!  batch      32 visible pixels at once: distances, places, unit normals
+//!  light      the lighting equation of the core over a batch, with shadows
 //!  paint      the steps of a tile, and the pixel's channels
 //!  faces      cameras that bend straight lines: faces of a cube, looked up
 //! ```
@@ -25,10 +26,12 @@
 //!
 //! **Color** is that of the pixel's center whatever number of samples is asked for, and coverage is 0 or 1.
 
+mod batch;
 mod bin;
 mod casters;
 mod clip;
 mod decide;
+mod face;
 mod faces;
 mod info;
 mod layers;
@@ -38,7 +41,6 @@ mod model;
 mod paint;
 mod plan;
 mod renderer;
-mod resolve;
 mod setup;
 mod shadow;
 #[cfg(test)]

@@ -1,12 +1,14 @@
 //! How much light leaves a point towards the eye, and how many lights reach it?
 
+use crate::batch::{BATCH, Batch, OCTETS, at};
+use crate::face::Face;
 use crate::model::Model;
-use crate::resolve::Point;
-use crate::shadow::{Shadows, Sight};
+use crate::shadow::{Looks, Shadows, Sight};
 use glam::{DAffine3, DVec3, Vec3};
+use polyptych_core::lanes::{DVec3x8, F32x8, LANES, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{Arriving, Light, LightKind, Scene, Shape};
-use polyptych_core::shade::{Surface, turned_away};
+use polyptych_core::shade::{Surfaces, turned_away};
 
 /// A light, made ready.
 pub(crate) struct Lamp {
@@ -32,14 +34,6 @@ pub(crate) struct Wants {
     pub(crate) shadow: bool,
 }
 
-/// What a point answers.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Lit {
-    pub(crate) color: Vec3,
-    /// Share of the shadow-casting lights that reach it.
-    pub(crate) shadow: f32,
-}
-
 impl Lamp {
     /// Lists all lights of a scene; those of voxels stand behind its own, by object and cell.
     pub(crate) fn all(scene: &Scene) -> Vec<Self> {
@@ -55,15 +49,6 @@ impl Lamp {
             light,
         };
         lights.into_iter().enumerate().map(lamp).collect()
-    }
-
-    /// Returns the light that would arrive at a point of the world if nothing were in between.
-    #[inline]
-    fn arriving(&self, point: DVec3) -> Option<Arriving> {
-        match self.light.kind {
-            LightKind::Directional { .. } => self.steady,
-            LightKind::Point { .. } | LightKind::Spot { .. } => self.light.arriving(point),
-        }
     }
 }
 
@@ -91,51 +76,142 @@ pub(crate) struct Illumination<'a> {
 }
 
 impl Illumination<'_> {
-    /// Lights a point; `origin` is that of the lens, `to_eye` has unit length.
-    #[inline]
-    pub(crate) fn light(&self, point: &Point<'_>, origin: DVec3, to_eye: DVec3, wants: Wants) -> Lit {
-        let environment = &self.scene.environment;
-        let surface = Surface {
-            material: point.material,
-            color: point.color,
-            normal: point.normal,
-            to_eye: to_eye.as_vec3(),
-        };
-        let mut color = if wants.color { surface.ambient(environment) } else { Vec3::ZERO };
-        let (mut casting, mut reaching) = (0u32, 0u32);
-        let position = origin + point.place;
+    /// Lights all samples of a batch; `faces` are those that it names.
+    #[inline(always)]
+    pub(crate) fn light(&self, batch: &mut Batch<'_>, faces: &[Face], origin: DVec3, wants: Wants) {
+        self.fill_ambient(batch, wants);
+        let (mut casting, mut reaching) = ([0u32; BATCH], [0u32; BATCH]);
         for (index, lamp) in self.lamps.iter().enumerate() {
-            let Some(arriving) = lamp.arriving(position) else { continue };
+            let arrivals = Arrivals::of(lamp, batch, origin);
+            let added = if wants.color { self.added(batch, &arrivals) } else { [BLACK; OCTETS] };
             let casts = lamp.light.casts_shadow;
-            casting += u32::from(casts);
-            if turned_away(point.true_normal, arriving.to_light) {
-                continue;
+            let (mut arrives, mut crosses) = ([false; BATCH], [false; BATCH]);
+            for i in (0..batch.count).filter(|&i| arrivals.distance[i] > 0.0) {
+                casting[i] += u32::from(casts);
+                let away = turned_away(at!(batch.true_normal, i), at!(arrivals.to_light, i));
+                let adds = at!(added, i) != Vec3::ZERO;
+                arrives[i] = !away && ((wants.shadow && casts) || adds);
+                crosses[i] = arrives[i] && casts && self.takes_shadow(&faces[usize::from(batch.face[i])]);
             }
-            let share = if wants.color {
-                surface.lit_by(environment.lighting, arriving.to_light.as_vec3(), arriving.radiance)
-            } else {
-                Vec3::ZERO
+            let looks = match self.shadows.filter(|_| crosses.contains(&true)) {
+                Some(shadows) => shadows.look(index, &batch.place, origin, &crosses),
+                None => Looks::none(),
             };
-            let needed = (wants.shadow && casts) || share != Vec3::ZERO;
-            if !needed || (casts && self.is_blocked(index, point, origin, &arriving)) {
-                continue;
+            for i in (0..batch.count).filter(|&i| arrives[i]) {
+                let triangle = faces[usize::from(batch.face[i])].id;
+                if looks.see_more_than(i, triangle)
+                    && self.is_blocked(&looks, i, (at!(batch.place, i), origin), triangle, &arrivals)
+                {
+                    continue;
+                }
+                batch.lit[i / LANES].set(i % LANES, at!(batch.lit, i) + at!(added, i));
+                reaching[i] += u32::from(casts);
             }
-            color += share;
-            reaching += u32::from(casts);
         }
-        let shadow =
-            if casting == 0 || !point.part.takes_shadow { 1.0 } else { reaching as f32 / casting as f32 };
-        Lit { color, shadow }
+        for i in 0..batch.count {
+            let takes = casting[i] > 0 && self.takes_shadow(&faces[usize::from(batch.face[i])]);
+            batch.shadow[i] = if takes { reaching[i] as f32 / casting[i] as f32 } else { 1.0 };
+        }
     }
 
-    fn is_blocked(&self, lamp: usize, point: &Point<'_>, origin: DVec3, arriving: &Arriving) -> bool {
-        let Some(shadows) = self.shadows.filter(|_| point.part.takes_shadow) else { return false };
-        let sight = Sight {
-            place: point.place + (origin - shadows.origin),
-            triangle: point.triangle,
-            to_light: arriving.to_light,
-            distance: arriving.distance,
-        };
-        shadows.is_blocked(self.scene, self.model, lamp, &sight)
+    #[inline(always)]
+    fn fill_ambient(&self, batch: &mut Batch<'_>, wants: Wants) {
+        let ambient = self.scene.environment.ambient;
+        for i in 0..batch.count {
+            let light = batch.material[i].filter(|_| wants.color).map_or(Vec3::ZERO, |material| {
+                material.emission + ambient * at!(batch.color, i) * material.ambient
+            });
+            batch.lit[i / LANES].set(i % LANES, light);
+        }
+    }
+
+    /// Returns what an unshadowed light adds to all samples, material by material.
+    #[inline(always)]
+    fn added(&self, batch: &Batch<'_>, arrivals: &Arrivals) -> [Vec3x8; OCTETS] {
+        let mut added = [BLACK; OCTETS];
+        for (o, added) in added.iter_mut().enumerate() {
+            let mut waiting: [_; LANES] = std::array::from_fn(|lane| {
+                batch.material[o * LANES + lane].filter(|_| o * LANES + lane < batch.count)
+            });
+            while let Some(material) = waiting.iter().flatten().next().copied() {
+                let (color, normal, to_eye) = (batch.color[o], batch.normal[o], batch.to_eye[o]);
+                let lit = Surfaces { material, color, normal, to_eye }.lit_by(
+                    self.scene.environment.lighting,
+                    arrivals.direction[o],
+                    arrivals.radiance[o],
+                );
+                let mut mask = Mask8::NONE;
+                for (lane, waits) in waiting.iter_mut().enumerate() {
+                    if waits.is_some_and(|m| std::ptr::eq(m, material)) {
+                        (*waits, mask.0[lane]) = (None, u32::MAX);
+                    }
+                }
+                *added = Vec3x8::pick(mask, lit, *added);
+            }
+        }
+        added
+    }
+
+    fn takes_shadow(&self, face: &Face) -> bool {
+        self.model.parts[face.part as usize].takes_shadow
+    }
+
+    #[inline(always)]
+    fn is_blocked(
+        &self,
+        looks: &Looks<'_>,
+        i: usize,
+        (place, origin): (DVec3, DVec3),
+        triangle: u32,
+        arrivals: &Arrivals,
+    ) -> bool {
+        let Some(shadows) = self.shadows else { return false };
+        let (place, distance) = (place + (origin - shadows.origin), arrivals.distance[i]);
+        let sight = Sight { place, triangle, to_light: at!(arrivals.to_light, i), distance };
+        shadows.is_blocked(self.scene, self.model, looks, i, &sight)
     }
 }
+
+/// The light of a lamp at all samples of a batch.
+struct Arrivals {
+    to_light: [DVec3x8; OCTETS],
+    /// The same in single precision.
+    direction: [Vec3x8; OCTETS],
+    radiance: [Vec3x8; OCTETS],
+    /// 0 where no light arrives.
+    distance: [f64; BATCH],
+}
+
+impl Arrivals {
+    #[inline(always)]
+    fn of(lamp: &Lamp, batch: &Batch<'_>, origin: DVec3) -> Self {
+        if let LightKind::Directional { .. } = lamp.light.kind {
+            let none = Arriving { to_light: DVec3::ZERO, distance: 0.0, radiance: Vec3::ZERO };
+            let arriving = lamp.steady.unwrap_or(none);
+            return Self {
+                to_light: [DVec3x8::splat(arriving.to_light); OCTETS],
+                direction: [Vec3x8::splat(arriving.to_light.as_vec3()); OCTETS],
+                radiance: [Vec3x8::splat(arriving.radiance); OCTETS],
+                distance: [arriving.distance; BATCH],
+            };
+        }
+        let mut all = Self {
+            to_light: [DVec3x8::splat(DVec3::ZERO); OCTETS],
+            direction: [BLACK; OCTETS],
+            radiance: [BLACK; OCTETS],
+            distance: [0.0; BATCH],
+        };
+        for i in 0..batch.count {
+            if let Some(arriving) = lamp.light.arriving(origin + at!(batch.place, i)) {
+                let (o, lane) = (i / LANES, i % LANES);
+                all.distance[i] = arriving.distance;
+                all.to_light[o].set(lane, arriving.to_light);
+                all.direction[o].set(lane, arriving.to_light.as_vec3());
+                all.radiance[o].set(lane, arriving.radiance);
+            }
+        }
+        all
+    }
+}
+
+const BLACK: Vec3x8 = Vec3x8 { x: F32x8([0.0; 8]), y: F32x8([0.0; 8]), z: F32x8([0.0; 8]) };

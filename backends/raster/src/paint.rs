@@ -1,13 +1,16 @@
 //! From triangles in tiles to pixels: visibility, then the surfaces that are seen, then their light.
 
+use crate::batch::{Ask, BATCH, Batch, at};
 use crate::bin::Bins;
-use crate::layers::{Fragment, collect, sort, take_pixel};
-use crate::lens::{Lens, PixelRay};
-use crate::light::{Illumination, Lit, Wants};
-use crate::resolve::{Ask, Point, Resolver};
+use crate::face::{Face, Faces};
+use crate::layers::{Fragment, collect, sort};
+use crate::lens::Lens;
+use crate::light::{Illumination, Wants};
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH, TileArea, TileBuffer, TileGrid};
 use glam::Vec3;
+use polyptych_core::camera::RowDirections;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
+use polyptych_core::lanes::LANES;
 use polyptych_core::seam::{Cancelled, Control};
 use polyptych_core::shade::fogged;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -25,6 +28,20 @@ pub(crate) struct Painter<'a> {
     ask: Ask,
 }
 
+/// Scratch memory of a band.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    fragments: Vec<Fragment>,
+    faces: Faces,
+}
+
+impl Scratch {
+    /// Returns the bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.fragments.capacity() * size_of::<Fragment>() + self.faces.bytes()
+    }
+}
+
 /// Whether finished bands are shown to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Announce {
@@ -40,29 +57,29 @@ impl<'a> Painter<'a> {
         Self { light, lens, bins, wants, ask }
     }
 
-    /// Draws all bands; `layers` is scratch for each band. Returns how many pixels were shaded.
+    /// Draws all bands, each with scratch memory of its own. Returns how many pixels were shaded.
     pub(crate) fn paint(
         &self,
         target: &mut Framebuffer,
-        layers: &mut Vec<Mutex<Vec<Fragment>>>,
+        scratch: &mut Vec<Mutex<Scratch>>,
         announce: Announce,
         control: &Control<'_>,
     ) -> Result<u64, Cancelled> {
         let grid = TileGrid::new(target.width(), target.height());
-        if layers.len() < grid.rows as usize {
-            layers.resize_with(grid.rows as usize, Mutex::default);
+        if scratch.len() < grid.rows as usize {
+            scratch.resize_with(grid.rows as usize, Mutex::default);
         }
-        let (layers, shaded, stopped) = (&*layers, AtomicU64::new(0), AtomicBool::new(false));
+        let (scratch, shaded, stopped) = (&*scratch, AtomicU64::new(0), AtomicBool::new(false));
         target.for_each_band(control.threads, TILE_HEIGHT, &|mut band| {
             let row = band.first_row / TILE_HEIGHT;
-            let mut fragments = layers[row as usize].lock().unwrap_or_else(PoisonError::into_inner);
+            let mut scratch = scratch[row as usize].lock().unwrap_or_else(PoisonError::into_inner);
             for column in 0..grid.columns {
                 if control.is_cancelled() {
                     stopped.store(true, Ordering::Relaxed);
                     return;
                 }
                 let tile = row as usize * grid.columns as usize + column as usize;
-                let count = self.paint_tile(&grid, tile, &mut band, &mut fragments);
+                let count = self.paint_tile(&grid, tile, &mut band, &mut scratch);
                 shaded.fetch_add(count, Ordering::Relaxed);
             }
             if announce == Announce::Yes {
@@ -72,73 +89,89 @@ impl<'a> Painter<'a> {
         if stopped.into_inner() { Err(Cancelled) } else { Ok(shaded.into_inner()) }
     }
 
-    fn paint_tile(
+    fn paint_tile(&self, grid: &TileGrid, tile: usize, band: &mut Band<'_>, scratch: &mut Scratch) -> u64 {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.paint_tile_avx2(grid, tile, band, scratch) };
+        }
+        self.paint_tile_here(grid, tile, band, scratch)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn paint_tile_avx2(
         &self,
         grid: &TileGrid,
         tile: usize,
         band: &mut Band<'_>,
-        fragments: &mut Vec<Fragment>,
+        scratch: &mut Scratch,
+    ) -> u64 {
+        self.paint_tile_here(grid, tile, band, scratch)
+    }
+
+    #[inline(always)]
+    fn paint_tile_here(
+        &self,
+        grid: &TileGrid,
+        tile: usize,
+        band: &mut Band<'_>,
+        scratch: &mut Scratch,
     ) -> u64 {
         let area = grid.area(tile);
         // 1. Visibility: the nearest solid triangle of each pixel.
         let mut buffer = TileBuffer::new();
-        for record in self.bins.solid(tile) {
-            buffer.draw(record, &area);
-        }
+        buffer.draw_here(self.bins.solid(tile), &area);
         // 2. What light may pass through, in front of it.
-        fragments.clear();
+        scratch.fragments.clear();
         for record in self.bins.layers(tile) {
-            collect(fragments, record, &area, &buffer);
+            collect(&mut scratch.fragments, record, &area, &buffer);
         }
-        sort(fragments);
-        // 3. Resolve: surfaces and their light, for what is visible only.
-        let mut surfaces = Resolver::new(self.light.scene, self.light.model, self.lens);
-        let mut behind_layers = Resolver::new(self.light.scene, self.light.model, self.lens);
-        let (mut waiting, mut shaded) = (&fragments[..], 0);
-        let empty = self.bins.solid(tile).next().is_none() && waiting.is_empty();
+        sort(&mut scratch.fragments);
         for row in 0..area.height as u32 {
-            self.background_row(&area, row, band);
-            if empty {
-                continue;
-            }
-            for column in 0..area.width as u32 {
-                let solid = buffer.id[(row * TILE_WIDTH + column) as usize];
-                if solid == NO_TRIANGLE && waiting.is_empty() {
-                    continue;
-                }
-                let (x, y) = (area.x as u32 + column, area.y as u32 + row);
-                let ray = self.lens.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
-                let of_pixel = take_pixel(&mut waiting, column, row);
-                let pixel = if !of_pixel.is_empty() {
-                    self.through_layers(&ray, of_pixel, solid, &mut behind_layers)
-                } else if solid != NO_TRIANGLE {
-                    self.of_surface(&ray, &surfaces.resolve(solid, &ray, self.ask))
-                } else {
-                    Pixel::background(self.background(&ray))
-                };
-                shaded += u64::from(pixel.id != 0);
-                band.put(x, row, &pixel);
+            let ids = &buffer.id[(row * TILE_WIDTH) as usize..][..area.width as usize];
+            if ids.contains(&NO_TRIANGLE) {
+                self.background_row(&area, row, band);
             }
         }
-        shaded
+        if self.bins.solid(tile).next().is_none() && scratch.fragments.is_empty() {
+            return 0;
+        }
+        // 3. Resolve: surfaces and their light, for what is visible only.
+        let Scratch { fragments, faces } = scratch;
+        faces.clear();
+        let mut tile = TilePainter { painter: self, area, band, faces, layers: Layers::default(), shaded: 0 };
+        let mut samples = Samples { solid: &buffer.id, layers: fragments, pixel: 0, behind_layers: false };
+        let (mut batch, mut more) = (Batch::new(), true);
+        while more {
+            match samples.next() {
+                Some((id, tag)) => tile.add(&mut batch, id, tag),
+                None => more = false,
+            }
+            if batch.is_full() || tile.faces.is_full() || !more {
+                tile.finish(&mut batch);
+            }
+        }
+        tile.shaded
     }
 
     /// Fills a row of a tile with what is seen where nothing is: most pixels of most pictures keep it.
+    #[inline(always)]
     fn background_row(&self, area: &TileArea, row: u32, band: &mut Band<'_>) {
         let from = (row * band.width) as usize + area.x as usize;
         let pixels = from..from + area.width as usize;
         let nothing = Pixel::background(Vec3::ZERO);
         if !band.color.is_empty() {
-            // The heights of the directions alone, in the precision of colors: most pixels see nothing else.
             let place = (f64::from(area.x) + 0.5, f64::from(area.y as u32 + row) + 0.5);
             let first = self.lens.line(place.0, place.1).1;
             let step = (self.lens.line(place.0 + 1.0, place.1).1 - first).as_vec3();
-            let first = first.as_vec3();
+            let directions = RowDirections { first: first.as_vec3(), step };
             let background = &self.light.scene.environment.background;
-            for (column, color) in band.color[pixels.clone()].iter_mut().enumerate() {
-                let direction = first + step * column as f32;
-                *color = finite(background.color_at(direction.y / direction.length()));
-            }
+            directions.fill(background, 0, &mut band.color[pixels.clone()]);
         }
         fn fill<T: Copy>(plane: &mut [T], pixels: std::ops::Range<usize>, value: T) {
             if !plane.is_empty() {
@@ -153,78 +186,184 @@ impl<'a> Painter<'a> {
         fill(band.coverage, pixels, nothing.coverage);
     }
 
-    /// Returns the color of a ray that meets nothing.
-    fn background(&self, ray: &PixelRay) -> Vec3 {
-        if !self.wants.color {
-            return Vec3::ZERO;
+    /// Finds and lights the surfaces of a batch.
+    #[inline(always)]
+    fn light(&self, batch: &mut Batch<'a>, faces: &[Face]) {
+        let light = &self.light;
+        // Opacity decides what is seen first.
+        let layered = batch.tag[..batch.count].iter().any(|tag| tag & LAYER != 0);
+        let ask = if layered { Ask::Color } else { self.ask };
+        batch.resolve(light.scene, light.model, self.lens, faces, ask);
+        if self.wants.color || self.wants.shadow {
+            light.light(batch, faces, self.lens.origin, self.wants);
         }
-        finite(self.light.scene.environment.background.color(ray.unit))
-    }
-
-    /// Returns what a pixel of one solid surface holds.
-    fn of_surface(&self, ray: &PixelRay, point: &Point<'_>) -> Pixel {
-        let lit = self.lit(ray, point, self.wants);
-        Pixel { color: finite(self.fogged(point, &lit)), ..seen(point, lit.shadow) }
-    }
-
-    /// Lays the fragments of a pixel over one another, and over the solid surface behind them.
-    fn through_layers(
-        &self,
-        ray: &PixelRay,
-        fragments: &[Fragment],
-        solid: u32,
-        resolver: &mut Resolver<'_>,
-    ) -> Pixel {
-        let (mut color, mut clear) = (Vec3::ZERO, 1.0_f32);
-        let mut first: Option<Pixel> = None;
-        let behind = (solid != NO_TRIANGLE).then_some(solid);
-        for id in fragments.iter().map(|f| f.id).chain(behind) {
-            let point = resolver.resolve(id, ray, Ask::Color);
-            if point.opacity <= 0.0 {
-                continue;
-            }
-            let wants = Wants { shadow: self.wants.shadow && first.is_none(), ..self.wants };
-            let lit = self.lit(ray, &point, wants);
-            first = first.or(Some(seen(&point, lit.shadow)));
-            if !self.wants.color {
-                break;
-            }
-            color += self.fogged(&point, &lit) * (clear * point.opacity);
-            clear *= 1.0 - point.opacity;
-            if clear < OPAQUE {
-                break;
+        if light.scene.environment.fog.is_some() {
+            for i in 0..batch.count {
+                let color = fogged(&light.scene.environment, at!(batch.lit, i), batch.distance[i]);
+                batch.lit[i / LANES].set(i % LANES, color);
             }
         }
-        if clear >= OPAQUE {
-            color += self.background(ray) * clear;
-        }
-        let color = finite(color);
-        Pixel { color, ..first.unwrap_or(Pixel::background(color)) }
-    }
-
-    fn lit(&self, ray: &PixelRay, point: &Point<'_>, wants: Wants) -> Lit {
-        if wants.color || wants.shadow {
-            self.light.light(point, self.lens.origin, -ray.unit, wants)
-        } else {
-            Lit { color: Vec3::ZERO, shadow: 1.0 }
-        }
-    }
-
-    fn fogged(&self, point: &Point<'_>, lit: &Lit) -> Vec3 {
-        fogged(&self.light.scene.environment, lit.color, point.distance)
     }
 }
 
-/// Returns what the geometry channels hold of the surface seen first.
-fn seen(point: &Point<'_>, shadow: f32) -> Pixel {
-    Pixel {
-        color: Vec3::ZERO,
-        distance: point.distance as f32,
-        normal: finite(point.normal),
-        id: point.part.object as u32 + 1,
-        albedo: finite(point.color),
-        shadow,
-        coverage: 1.0,
+/// Flags of a sample's tag, above the pixel's index in the tile.
+const LAYER: u32 = 1 << 16;
+const LAST: u32 = 1 << 17;
+
+/// Lists what a tile shows, pixel by pixel and front to back.
+struct Samples<'t> {
+    solid: &'t [u32],
+    /// By pixel, those before this one taken off.
+    layers: &'t [Fragment],
+    pixel: u32,
+    behind_layers: bool,
+}
+
+impl Iterator for Samples<'_> {
+    /// A triangle and a tag.
+    type Item = (u32, u32);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(u32, u32)> {
+        while let Some(&solid) = self.solid.get(self.pixel as usize) {
+            let pixel = self.pixel;
+            let [layer, next] = [0, 1].map(|i| self.layers.get(i).filter(|f| f.pixel == pixel));
+            if let Some(layer) = layer {
+                self.layers = &self.layers[1..];
+                self.behind_layers = next.is_some() || solid != NO_TRIANGLE;
+                self.pixel += u32::from(!self.behind_layers);
+                return Some((layer.id, pixel | LAYER | if self.behind_layers { 0 } else { LAST }));
+            }
+            self.pixel += 1;
+            let kind = if std::mem::take(&mut self.behind_layers) { LAYER } else { 0 };
+            if solid != NO_TRIANGLE {
+                return Some((solid, pixel | LAST | kind));
+            }
+        }
+        None
+    }
+}
+
+/// A tile whose samples are being put into the picture.
+struct TilePainter<'t, 'a, 'b> {
+    painter: &'t Painter<'a>,
+    area: TileArea,
+    band: &'t mut Band<'b>,
+    faces: &'t mut Faces,
+    layers: Layers,
+    shaded: u64,
+}
+
+/// What is known of the pixel whose layers are being laid over one another.
+struct Layers {
+    color: Vec3,
+    clear: f32,
+    first: Option<Pixel>,
+}
+
+impl Default for Layers {
+    fn default() -> Self {
+        Self { color: Vec3::ZERO, clear: 1.0, first: None }
+    }
+}
+
+impl<'a> TilePainter<'_, 'a, '_> {
+    /// Adds a sample to a batch that is not full.
+    #[inline(always)]
+    fn add(&mut self, batch: &mut Batch<'a>, id: u32, tag: u32) {
+        let light = &self.painter.light;
+        let face = self.faces.find(light.scene, light.model, self.painter.lens, id);
+        let (x, y) = self.place(tag);
+        batch.push(f64::from(x) + 0.5, f64::from(y) + 0.5, face, tag);
+    }
+
+    /// Returns the column and row of a sample in the picture.
+    fn place(&self, tag: u32) -> (u32, u32) {
+        let pixel = tag % LAYER;
+        (self.area.x as u32 + pixel % TILE_WIDTH, self.area.y as u32 + pixel / TILE_WIDTH)
+    }
+
+    /// Draws all samples of the batch into the picture.
+    #[inline(always)]
+    fn finish(&mut self, batch: &mut Batch<'a>) {
+        self.painter.light(batch, &self.faces.faces);
+        let mut index = [0; BATCH];
+        for i in 0..batch.count {
+            let (x, y) = self.place(batch.tag[i]);
+            index[i] = ((y - self.band.first_row) * self.band.width + x) as usize;
+        }
+        if batch.tag[..batch.count].iter().any(|tag| tag & LAYER != 0) {
+            for (i, &index) in index[..batch.count].iter().enumerate() {
+                self.lay(batch, i, index);
+            }
+        } else {
+            self.write(batch, &index[..batch.count]);
+        }
+        batch.count = 0;
+        if self.faces.is_full() {
+            self.faces.clear();
+        }
+    }
+
+    /// Writes samples of solid surfaces, plane by plane.
+    fn write(&mut self, batch: &Batch<'_>, index: &[usize]) {
+        fn fill<T>(plane: &mut [T], index: &[usize], value: impl Fn(usize) -> T) {
+            if !plane.is_empty() {
+                index.iter().enumerate().for_each(|(i, &at)| plane[at] = value(i));
+            }
+        }
+        let (parts, faces) = (&self.painter.light.model.parts, &self.faces.faces);
+        let object = |i: usize| parts[faces[usize::from(batch.face[i])].part as usize].object;
+        fill(self.band.color, index, |i| finite(at!(batch.lit, i)));
+        fill(self.band.distance, index, |i| batch.distance[i] as f32);
+        fill(self.band.normal, index, |i| finite(at!(batch.normal, i)));
+        fill(self.band.id, index, |i| object(i) as u32 + 1);
+        fill(self.band.albedo, index, |i| finite(at!(batch.color, i)));
+        fill(self.band.shadow, index, |i| batch.shadow[i]);
+        fill(self.band.coverage, index, |_| 1.0);
+        self.shaded += index.len() as u64;
+    }
+
+    /// Lays a sample behind those of its pixel that came before; the last one writes the pixel.
+    fn lay(&mut self, batch: &Batch<'_>, i: usize, index: usize) {
+        if batch.tag[i] & LAYER == 0 {
+            // A solid surface without layers may stand in a batch with layers of others.
+            self.layers = Layers { color: at!(batch.lit, i), clear: 0.0, first: Some(self.seen(batch, i)) };
+        } else if batch.opacity[i] > 0.0 && self.layers.clear >= OPAQUE {
+            let layers = &mut self.layers;
+            layers.color += at!(batch.lit, i) * (layers.clear * batch.opacity[i]);
+            layers.clear *= 1.0 - batch.opacity[i];
+            if layers.first.is_none() {
+                self.layers.first = Some(self.seen(batch, i));
+            }
+        }
+        if batch.tag[i] & LAST == 0 {
+            return;
+        }
+        let Layers { mut color, clear, first } = std::mem::take(&mut self.layers);
+        let painter = self.painter;
+        if clear >= OPAQUE && painter.wants.color {
+            let direction = -at!(batch.to_eye, i);
+            color += finite(painter.light.scene.environment.background.color(direction.as_dvec3())) * clear;
+        }
+        let color = finite(color);
+        let pixel = Pixel { color, ..first.unwrap_or(Pixel::background(color)) };
+        self.shaded += u64::from(pixel.id != 0);
+        self.band.put(index as u32 % self.band.width, index as u32 / self.band.width, &pixel);
+    }
+
+    /// Returns what the geometry channels hold of the surface seen first.
+    fn seen(&self, batch: &Batch<'_>, i: usize) -> Pixel {
+        let face = &self.faces.faces[usize::from(batch.face[i])];
+        Pixel {
+            color: Vec3::ZERO,
+            distance: batch.distance[i] as f32,
+            normal: finite(at!(batch.normal, i)),
+            id: self.painter.light.model.parts[face.part as usize].object as u32 + 1,
+            albedo: finite(at!(batch.color, i)),
+            shadow: batch.shadow[i],
+            coverage: 1.0,
+        }
     }
 }
 

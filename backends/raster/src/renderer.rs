@@ -4,11 +4,10 @@ use crate::bin::{Bins, Pass};
 use crate::decide::{self, RESAMPLED, is_resampled};
 use crate::faces::{Faces, face_lens, needed};
 use crate::info::{Options, info};
-use crate::layers::Fragment;
 use crate::lens::Lens;
 use crate::light::{Illumination, Lamp};
 use crate::model::{Model, Role, Source};
-use crate::paint::{Announce, Painter};
+use crate::paint::{self, Announce, Painter};
 use crate::plan::plan;
 use crate::shadow::{MapSizes, Shadows};
 use crate::tile::TileGrid;
@@ -70,7 +69,7 @@ struct Ready {
 struct Scratch {
     vertices: Vec<ScreenVertex>,
     bins: Bins,
-    layers: Vec<Mutex<Vec<Fragment>>>,
+    bands: Vec<Mutex<paint::Scratch>>,
     faces: Faces,
 }
 
@@ -291,7 +290,7 @@ impl Scratch {
             announce,
             work,
             control,
-            (&mut self.vertices, &mut self.bins, &mut self.layers),
+            (&mut self.vertices, &mut self.bins, &mut self.bands),
         )
     }
 
@@ -310,7 +309,7 @@ impl Scratch {
         let needed = needed(camera, width, height, control.threads);
         for face in (0..6).filter(|face| needed >> face & 1 == 1) {
             let lens = face_lens(camera, face, edge, ready.near(camera));
-            let buffers = (&mut self.vertices, &mut self.bins, &mut self.layers);
+            let buffers = (&mut self.vertices, &mut self.bins, &mut self.bands);
             let picture = self.faces.picture(face);
             draw(ready, &lens, picture, Announce::No, work, control, buffers)?;
         }
@@ -326,19 +325,14 @@ impl Scratch {
     }
 
     fn bytes(&self) -> u64 {
-        let layers: usize = self
-            .layers
-            .iter()
-            .filter_map(|l| l.lock().ok())
-            .map(|l| l.capacity() * size_of::<Fragment>())
-            .sum();
-        (self.vertices.capacity() * size_of::<ScreenVertex>() + layers) as u64
+        let bands: usize = self.bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
+        (self.vertices.capacity() * size_of::<ScreenVertex>() + bands) as u64
             + self.bins.bytes()
             + self.faces.bytes()
     }
 }
 
-type Buffers<'a> = (&'a mut Vec<ScreenVertex>, &'a mut Bins, &'a mut Vec<Mutex<Vec<Fragment>>>);
+type Buffers<'a> = (&'a mut Vec<ScreenVertex>, &'a mut Bins, &'a mut Vec<Mutex<paint::Scratch>>);
 
 /// The pipeline.
 fn draw(
@@ -348,7 +342,7 @@ fn draw(
     announce: Announce,
     work: &mut Work,
     control: &Control<'_>,
-    (vertices, bins, layers): Buffers<'_>,
+    (vertices, bins, bands): Buffers<'_>,
 ) -> Result<(), Cancelled> {
     control.check()?;
     let culls_back = ready.options.culls_back;
@@ -368,7 +362,7 @@ fn draw(
         shadows: ready.shadows.as_deref(),
     };
     let painter = Painter::new(light, lens, bins, target.channels());
-    work.shaded += painter.paint(target, layers, announce, control)?;
+    work.shaded += painter.paint(target, bands, announce, control)?;
     work.phases.end("draw");
     Ok(())
 }

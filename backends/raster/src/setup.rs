@@ -1,5 +1,7 @@
 //! What does a tile need to know of a triangle: exact edges and the plane of its depth.
 
+use polyptych_core::lanes::{F32x8, F64x8, I32x8};
+
 /// Steps of a corner's place within a pixel: corners are snapped to 24.8 bits.
 pub(crate) const STEPS: i32 = 256;
 
@@ -65,6 +67,18 @@ fn round(v: f64) -> i32 {
     (v + 6_755_399_441_055_744.0).to_bits() as i32
 }
 
+/// Returns the first column or row whose pixel centers three corners can enclose.
+#[inline(always)]
+fn first_pixel(v: &[i32; 3]) -> i32 {
+    (v[0].min(v[1]).min(v[2]) + (STEPS / 2 - 1)) >> 8
+}
+
+/// Returns the last.
+#[inline(always)]
+fn last_pixel(v: &[i32; 3]) -> i32 {
+    (v[0].max(v[1]).max(v[2]) - STEPS / 2) >> 8
+}
+
 impl Record {
     /// Snaps and orders the corners; nothing where no area is left or the side is not drawn.
     ///
@@ -72,8 +86,9 @@ impl Record {
     /// their neighbors would stay open.
     pub(crate) fn new(points: &[ScreenPoint; 3], plane: DepthPlane, id: u32, sides: Sides) -> Option<Self> {
         let steps = f64::from(STEPS);
-        let mut x = points.map(|p| round(p.x * steps));
-        let mut y = points.map(|p| round(p.y * steps));
+        let [a, b, c] = points;
+        let mut x = [round(a.x * steps), round(b.x * steps), round(c.x * steps)];
+        let mut y = [round(a.y * steps), round(b.y * steps), round(c.y * steps)];
         let area =
             i64::from(x[1] - x[0]) * i64::from(y[2] - y[0]) - i64::from(x[2] - x[0]) * i64::from(y[1] - y[0]);
         let drawn = match sides {
@@ -82,6 +97,10 @@ impl Record {
             Sides::Clockwise => area > 0,
         };
         if !drawn {
+            return None;
+        }
+        let pixels = |v: &[i32; 3]| first_pixel(v) <= last_pixel(v);
+        if !(pixels(&x) && pixels(&y)) {
             return None;
         }
         if area < 0 {
@@ -93,7 +112,7 @@ impl Record {
         let depth = first.depth
             + plane.by_column * (f64::from(x[0]) / steps - first.x)
             + plane.by_row * (f64::from(y[0]) / steps - first.y);
-        let depths = points.map(|p| p.depth);
+        let depths = [a.depth, b.depth, c.depth];
         Some(Self {
             x,
             y,
@@ -106,21 +125,43 @@ impl Record {
     }
 
     /// Returns the first and last column and row whose pixel centers can be covered; maybe none.
+    #[inline(always)]
     pub(crate) fn pixels(&self) -> ([i32; 2], [i32; 2]) {
-        let first = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]) + (STEPS / 2 - 1)) >> 8;
-        let last = |v: &[i32; 3]| (v[0].max(v[1]).max(v[2]) - STEPS / 2) >> 8;
-        ([first(&self.x), last(&self.x)], [first(&self.y), last(&self.y)])
+        let both = |v: &[i32; 3]| [first_pixel(v), last_pixel(v)];
+        (both(&self.x), both(&self.y))
     }
 
-    /// Returns the depth at a pixel's center, not yet held between those of the corners.
-    pub(crate) fn depth_at(&self, x: i32, y: i32) -> f64 {
+    /// Returns the depth of the first corner's column at the center of a row.
+    #[inline(always)]
+    pub(crate) fn depth_of_row(&self, y: i32) -> f64 {
+        let offset = f64::from((y << 8) + STEPS / 2 - self.y[0]) * (1.0 / f64::from(STEPS));
+        self.depth + self.plane.by_row * offset
+    }
+
+    /// Returns what the center of a column adds to the depth of its row. The sum is not yet held between the
+    /// depths of the corners; it is the same however a triangle is drawn.
+    #[inline(always)]
+    pub(crate) fn depth_of_column(&self, x: i32) -> f64 {
+        self.plane.by_column * (f64::from((x << 8) + STEPS / 2 - self.x[0]) * (1.0 / f64::from(STEPS)))
+    }
+
+    /// Returns what the centers of eight columns add.
+    #[inline(always)]
+    pub(crate) fn depth_of_columns(&self, x: i32) -> F64x8 {
         let offset =
-            |pixel: i32, corner: i32| f64::from((pixel << 8) + STEPS / 2 - corner) * (1.0 / f64::from(STEPS));
-        self.depth + self.plane.by_column * offset(x, self.x[0]) + self.plane.by_row * offset(y, self.y[0])
+            I32x8::count_from(0) * I32x8::splat(STEPS) + I32x8::splat((x << 8) + STEPS / 2 - self.x[0]);
+        F64x8::splat(self.plane.by_column) * (offset.to_f64() * F64x8::splat(1.0 / f64::from(STEPS)))
+    }
+
+    /// Rounds and holds eight depths; see [`Record::hold`].
+    #[inline(always)]
+    pub(crate) fn hold_all(&self, depth: F64x8) -> F32x8 {
+        F32x8::splat(self.nearest).min(F32x8::splat(self.farthest).max(depth.round()))
     }
 
     /// Rounds a depth and holds it between those of the corners: the plane of a triangle seen from the edge is
     /// so steep that it would stick out where a snapped corner moved over a pixel's center.
+    #[inline(always)]
     pub(crate) fn hold(&self, depth: f64) -> f32 {
         let depth = depth as f32;
         let depth = if depth < self.farthest { self.farthest } else { depth };

@@ -14,15 +14,17 @@
 //! Source of storing names instead of depths: J. C. Hourcade, A. Nicolas, *Algorithms for antialiased cast
 //! shadows*, Computers & Graphics 9(3), 1985; comparing planes instead of equal names is ours.
 
+use crate::batch::{BATCH, OCTETS};
 use crate::bin::{Bins, Pass};
 use crate::casters::Casters;
+use crate::face::{Face, Place};
 use crate::lens::{Lens, Rays, cube_axes, cube_face};
 use crate::light::Lamp;
 use crate::model::{Class, Model, Role};
-use crate::resolve::{Ask, Resolver};
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileBuffer, TileGrid};
 use crate::transform::{ScreenVertex, transform};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
+use polyptych_core::lanes::{DVec3x8, LANES};
 use polyptych_core::math::{Aabb, orthonormal_basis};
 use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{LightKind, Scene};
@@ -44,7 +46,7 @@ pub(crate) struct Shadows {
     /// One for each lamp; without faces for those that cast no shadow.
     maps: Vec<Map>,
     /// One for each triangle of the model.
-    planes: Vec<Plane>,
+    blockers: Vec<Blocker>,
     tolerance: f64,
 }
 
@@ -54,17 +56,41 @@ struct Map {
     faces: Vec<MapFace>,
 }
 
-struct MapFace {
+pub(crate) struct MapFace {
     lens: Lens,
     grid: TileGrid,
     tiles: Vec<[u32; TILE_PIXELS]>,
 }
 
-/// `normal . p = offset`.
+/// The corners of a triangle, relative to [`Shadows::origin`]: close together in memory, since lookups jump.
+/// Neighbors round a corner alike, so the way to a light finds no gap between them.
 #[derive(Clone, Copy, Default)]
+struct Blocker([Vec3; 3]);
+
+/// `normal . p = offset`.
 struct Plane {
     normal: DVec3,
     offset: f64,
+}
+
+impl Blocker {
+    fn plane(&self) -> Plane {
+        let [a, b, c] = self.0.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        Plane { normal, offset: normal.dot(a) }
+    }
+
+    /// Tells whether a line through a point passes through the triangle.
+    #[inline(always)]
+    fn is_crossed(&self, place: DVec3, direction: DVec3) -> bool {
+        let [a, b, c] = self.0;
+        let (a, b, c) = (a.as_dvec3() - place, b.as_dvec3() - place, c.as_dvec3() - place);
+        // Volumes spanned by the line and each edge, of one sign inside (edges belong to both neighbors).
+        let u = b.cross(c).dot(direction);
+        let v = c.cross(a).dot(direction);
+        let w = a.cross(b).dot(direction);
+        ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0))
+    }
 }
 
 /// The way from a point to a light.
@@ -76,6 +102,38 @@ pub(crate) struct Sight {
     pub(crate) triangle: u32,
     pub(crate) to_light: DVec3,
     pub(crate) distance: f64,
+}
+
+/// What the map of a light shows around the points of a batch.
+pub(crate) struct Looks<'a> {
+    /// Nothing where the light does not see the point.
+    face: [Option<&'a MapFace>; BATCH],
+    /// Column and row of the first of the texels whose centers are the corners of the square around the point.
+    texel: [[i32; 2]; BATCH],
+    ids: [[u32; 4]; BATCH],
+}
+
+impl<'a> Looks<'a> {
+    pub(crate) fn none() -> Self {
+        Self { face: [None; BATCH], texel: [[0; 2]; BATCH], ids: [[NO_TRIANGLE; 4]; BATCH] }
+    }
+
+    /// Looks where a point falls on a column and row of a face, if the light sees them.
+    #[inline(always)]
+    fn look(&mut self, i: usize, face: &'a MapFace, x: f64, y: f64, ahead: f64) {
+        let (right, bottom) = (f64::from(face.lens.width) + 0.5, f64::from(face.lens.height) + 0.5);
+        if (ahead > 0.0) & (x >= -0.5) & (x <= right) & (y >= -0.5) & (y <= bottom) {
+            self.texel[i] = [(x + 0.5) as i32 - 1, (y + 0.5) as i32 - 1];
+            self.ids[i] = face.square(self.texel[i][0], self.texel[i][1]);
+            self.face[i] = Some(face);
+        }
+    }
+
+    /// Tells whether the light sees more than one triangle around a point.
+    #[inline(always)]
+    pub(crate) fn see_more_than(&self, i: usize, triangle: u32) -> bool {
+        self.ids[i].iter().any(|&id| (id != NO_TRIANGLE) & (id != triangle))
+    }
 }
 
 /// Edge of the maps of each kind of light.
@@ -120,8 +178,8 @@ impl Shadows {
         let origin = model.bounds.center();
         let tolerance = ON_PLANE * model.reach.max(model.bounds.radius());
         let casters = Casters::of(model, tolerance);
-        let planes = planes(model, origin, control.threads);
-        let mut shadows = Self { origin, maps: Vec::with_capacity(lamps.len()), planes, tolerance };
+        let blockers = blockers(model, origin, control.threads);
+        let mut shadows = Self { origin, maps: Vec::with_capacity(lamps.len()), blockers, tolerance };
         for lamp in lamps {
             let mut map = Map::default();
             let (bounds, left_out) = casters.of_light(model, &lamp.light.kind, lamp.cell);
@@ -148,76 +206,83 @@ impl Shadows {
     /// Returns the bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let tiles: usize = self.maps.iter().flat_map(|m| &m.faces).map(|f| f.tiles.len()).sum();
-        (tiles * TILE_PIXELS * 4 + self.planes.len() * size_of::<Plane>()) as u64
+        (tiles * TILE_PIXELS * 4 + self.blockers.len() * size_of::<Blocker>()) as u64
     }
 
-    /// Tells whether something stands between a point and a light.
-    #[inline]
-    pub(crate) fn is_blocked(&self, scene: &Scene, model: &Model, lamp: usize, sight: &Sight) -> bool {
-        let map = &self.maps[lamp];
-        let face = match map.faces.len() {
-            0 => return false,
-            1 => &map.faces[0],
-            _ => &map.faces[cube_face(sight.place - map.faces[0].lens.origin)],
-        };
-        let (x, y, ahead) = face.lens.place(sight.place - face.lens.origin);
-        let seen = ahead > 0.0
-            && (-0.5..=f64::from(face.lens.width) + 0.5).contains(&x)
-            && (-0.5..=f64::from(face.lens.height) + 0.5).contains(&y);
-        if !seen {
-            return false;
+    /// Looks points up in the map of a light. `origin` is what the places are relative to.
+    #[inline(always)]
+    pub(crate) fn look(
+        &self,
+        lamp: usize,
+        places: &[DVec3x8; OCTETS],
+        origin: DVec3,
+        wanted: &[bool; BATCH],
+    ) -> Looks<'_> {
+        let mut looks = Looks::none();
+        let faces = &self.maps[lamp].faces[..];
+        let Some(first) = faces.first() else { return looks };
+        for (o, places) in places.iter().enumerate() {
+            let places = *places + DVec3x8::splat(origin - self.origin);
+            let [x, y, ahead] = first.lens.places(places - DVec3x8::splat(first.lens.origin));
+            for lane in (0..LANES).filter(|lane| wanted[o * LANES + lane]) {
+                let i = o * LANES + lane;
+                if faces.len() == 1 {
+                    looks.look(i, first, x.0[lane], y.0[lane], ahead.0[lane]);
+                } else {
+                    let place = places.get(lane);
+                    let face = &faces[cube_face(place - first.lens.origin)];
+                    let (x, y, ahead) = face.lens.place(place - face.lens.origin);
+                    looks.look(i, face, x, y, ahead);
+                }
+            }
         }
-        // The texels whose centers are the corners of the square around the place.
-        let (column, row) = ((x + 0.5) as i32 - 1, (y + 0.5) as i32 - 1);
-        let ids = face.square(column, row);
-        if ids.iter().all(|&id| id == NO_TRIANGLE || id == sight.triangle) {
-            return false;
-        }
-        self.is_blocked_by(scene, model, face, (column, row), &ids, sight)
+        looks
     }
 
-    /// Tells whether one of the triangles at four texels stands in between.
-    fn is_blocked_by(
+    /// Tells whether one of the triangles at the texels around a point stands between it and the light.
+    pub(crate) fn is_blocked(
         &self,
         scene: &Scene,
         model: &Model,
-        face: &MapFace,
-        (column, row): (i32, i32),
-        ids: &[u32; 4],
+        looks: &Looks<'_>,
+        i: usize,
         sight: &Sight,
     ) -> bool {
-        let mut all_in_front = true;
-        let (mut last, mut last_before) = (NO_TRIANGLE, false);
-        for (i, &id) in ids.iter().enumerate() {
-            if id == NO_TRIANGLE || id == sight.triangle {
-                all_in_front = false;
-                continue;
+        let (Some(face), [column, row], ids) = (looks.face[i], looks.texel[i], &looks.ids[i]) else {
+            return false;
+        };
+        let foreign = |id: u32| (id != NO_TRIANGLE) & (id != sight.triangle);
+        for (i, &id) in ids.iter().enumerate().filter(|(_, id)| foreign(**id)) {
+            let is_new = !ids[..i].contains(&id);
+            let blocker = &self.blockers[id as usize];
+            if is_new
+                && blocker.is_crossed(sight.place, sight.to_light)
+                && self.is_before(&blocker.plane(), sight)
+                && self.is_solid(scene, model, id, sight)
+            {
+                return true;
             }
-            if id != last {
-                last = id;
-                last_before = self.is_before(id, sight);
-                if last_before && self.runs_through(scene, model, id, sight) {
-                    return true;
-                }
-            }
-            let texel = (f64::from(column) + 0.5 + (i % 2) as f64, f64::from(row) + 0.5 + (i / 2) as f64);
-            all_in_front = all_in_front && last_before && self.is_above(face, id, texel, sight);
         }
-        all_in_front
+        ids.iter().all(|&id| foreign(id))
+            && ids.iter().enumerate().all(|(i, &id)| {
+                let (x, y) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
+                let texel = (x + (i % 2) as f64, y + (i / 2) as f64);
+                let plane = self.blockers[id as usize].plane();
+                self.is_before(&plane, sight) && self.is_above(face, &plane, texel, sight)
+            })
     }
 
-    /// Tells whether the plane of a triangle is between the point and the light.
-    fn is_before(&self, id: u32, sight: &Sight) -> bool {
-        let plane = &self.planes[id as usize];
+    /// Tells whether a plane is between the point and the light.
+    fn is_before(&self, plane: &Plane, sight: &Sight) -> bool {
         let gap = plane.offset - plane.normal.dot(sight.place);
-        let along = gap / plane.normal.dot(sight.to_light);
-        gap.abs() > self.tolerance && along > 0.0 && along < sight.distance
+        let slope = plane.normal.dot(sight.to_light);
+        gap.abs() > self.tolerance && gap * slope > 0.0 && gap.abs() < slope.abs() * sight.distance
     }
 
-    /// Tells whether the point of a triangle at a texel's center is on the light's side of the plane of the
+    /// Tells whether the point of a plane at a texel's center is on the light's side of the plane of the
     /// point's own triangle.
-    fn is_above(&self, face: &MapFace, id: u32, texel: (f64, f64), sight: &Sight) -> bool {
-        let (plane, own) = (&self.planes[id as usize], &self.planes[sight.triangle as usize]);
+    fn is_above(&self, face: &MapFace, plane: &Plane, texel: (f64, f64), sight: &Sight) -> bool {
+        let own = self.blockers[sight.triangle as usize].plane();
         let (start, direction) = face.lens.line(texel.0, texel.1);
         let start = start + face.lens.origin;
         let t = (plane.offset - plane.normal.dot(start)) / plane.normal.dot(direction);
@@ -225,32 +290,22 @@ impl Shadows {
         height * own.normal.dot(sight.to_light).signum() > self.tolerance
     }
 
-    /// Tells whether the way to the light runs through a solid point of a triangle whose plane it crosses.
-    fn runs_through(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
+    /// Tells whether a triangle is no hole where the way to the light crosses it.
+    fn is_solid(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
         let (index, triangle) = model.find(id);
         let part = &model.parts[index];
-        let corners = part.corners(triangle, self.origin + sight.place);
-        // Volumes spanned by the way and each edge, of one sign inside (edges belong to both neighbors).
-        let weight = |a: DVec3, b: DVec3| a.cross(b).dot(sight.to_light);
-        let u = weight(corners[1], corners[2]);
-        let v = weight(corners[2], corners[0]);
-        let w = weight(corners[0], corners[1]);
-        let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-        if !inside {
-            return false;
-        }
-        let slot = part.mesh().slot(triangle);
-        if part.class(Role::Light, slot) == Class::Solid {
+        if part.class(Role::Light, part.mesh().slot(triangle)) == Class::Solid {
             return true;
         }
         let lens = Lens::parallel(self.origin + sight.place, looking(sight.to_light), [1.0; 2], [0; 2]);
-        Resolver::new(scene, model, &lens).resolve(id, &lens.ray(0.0, 0.0), Ask::Color).opacity > 0.0
+        let place = Place { scene, model, lens: &lens, x: 0.0, y: 0.0 };
+        place.is_solid(&Face::new(scene, model, &lens, id))
     }
 }
 
 impl MapFace {
     /// Returns the triangles at a texel, its right neighbor, and the two below.
-    #[inline]
+    #[inline(always)]
     fn square(&self, column: i32, row: i32) -> [u32; 4] {
         let (x, y) = (column as u32, row as u32);
         let (in_tile_x, in_tile_y) = (x % TILE_WIDTH, y % TILE_HEIGHT);
@@ -274,18 +329,16 @@ impl MapFace {
     }
 }
 
-fn planes(model: &Model, origin: DVec3, threads: &dyn Threads) -> Vec<Plane> {
-    let mut planes = vec![Plane::default(); model.triangles as usize];
+fn blockers(model: &Model, origin: DVec3, threads: &dyn Threads) -> Vec<Blocker> {
+    let mut blockers = vec![Blocker::default(); model.triangles as usize];
     for part in &model.parts {
         let count = part.mesh().triangles.len();
-        let of_part = &mut planes[part.first_triangle as usize..][..count];
-        for_each_mut(threads, of_part, 1024, &|triangle, plane| {
-            let [a, b, c] = part.corners(triangle, origin);
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            *plane = Plane { normal, offset: normal.dot(a) };
+        let of_part = &mut blockers[part.first_triangle as usize..][..count];
+        for_each_mut(threads, of_part, 1024, &|triangle, blocker| {
+            *blocker = Blocker(part.corners(triangle, origin).map(|p| p.as_vec3()));
         });
     }
-    planes
+    blockers
 }
 
 /// Returns axes (right, up, backward) of a view along a direction.
@@ -347,13 +400,11 @@ fn draw(
     for_each_mut(threads, &mut tiles, 4, &|index, tile| {
         let area = grid.area(index);
         let mut buffer = TileBuffer::new();
-        for record in bins.solid(index) {
-            buffer.draw(record, &area);
-        }
-        let mut resolver = Resolver::new(scene, pass.model, pass.lens);
+        buffer.draw(bins.solid(index), &area);
         for record in bins.layers(index) {
+            let face = Face::new(scene, pass.model, pass.lens, record.id);
             buffer.draw_where(record, &area, |x, y| {
-                resolver.resolve(record.id, &pass.lens.ray(x, y), Ask::Color).opacity > 0.0
+                Place { scene, model: pass.model, lens: pass.lens, x, y }.is_solid(&face)
             });
         }
         *tile = buffer.id;

@@ -3,7 +3,7 @@
 use crate::contour::Contours;
 use crate::tone::Tone;
 use glam::{DVec3, Vec3};
-use polyptych_core::camera::View;
+use polyptych_core::camera::{RowDirections, View};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer};
 use polyptych_core::parallel::for_each_mut;
@@ -329,8 +329,15 @@ impl Painting<'_> {
         for row in 0..band.rows {
             let y = band.first_row + row;
             let line = &mut band.color[(row * band.width) as usize..((row + 1) * band.width) as usize];
+            let directions = self.view.row(y);
+            if let Some(directions) = directions {
+                directions.fill(&self.scene.environment.background, 0, line);
+            }
             for (x, color) in line.iter_mut().enumerate() {
-                *color = self.pixel(x as u32, y);
+                let id = self.visible.id()[(y * band.width) as usize + x];
+                if id != 0 || directions.is_none() {
+                    *color = self.pixel(x as u32, y, directions.as_ref());
+                }
             }
             if self.style.contours.drawn {
                 self.lines(y, line);
@@ -338,7 +345,7 @@ impl Painting<'_> {
         }
     }
 
-    fn pixel(&self, x: u32, y: u32) -> Vec3 {
+    fn pixel(&self, x: u32, y: u32, directions: Option<&RowDirections>) -> Vec3 {
         let i = (y * self.visible.width() + x) as usize;
         let ray = || self.view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let id = self.visible.id()[i];
@@ -347,7 +354,10 @@ impl Painting<'_> {
         }
         let (normal, distance) = (self.visible.normal()[i], self.visible.distance()[i]);
         let position = || ray().map_or(DVec3::ZERO, |r| r.at(f64::from(distance)));
-        let to_eye = || ray().map_or(Vec3::Y, |r| -r.direction.as_vec3());
+        let to_eye = || match directions {
+            Some(directions) => -directions.at(x),
+            None => ray().map_or(Vec3::Y, |r| -r.direction.as_vec3()),
+        };
         let light = self.light.toward(position, to_eye);
         let facing = normal.dot(light);
         // In full shadow a surface is as cool as one that turns its side to the light.

@@ -19,14 +19,26 @@ pub(crate) struct Layer {
 
 impl Layer {
     /// Returns the exponent of an empty block around a cell of the grid, or nothing when the cell is marked.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn empty_around(&self, cell: [i32; 3]) -> Option<u32> {
-        let [x, y, z] = cell.map(|c| c as u32);
+        let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         let chunk = |c: u32| (c / CHUNK) as usize;
         match &self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)] {
             None => Some(Occupancy::EXPONENT),
             Some(chunk) => chunk.empty_around([x, y, z]),
         }
+    }
+
+    /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells at a cell; false beyond the
+    /// grid.
+    pub(crate) fn has_block(&self, cell: [i32; 3], exponent: u32) -> bool {
+        if (0..3).any(|a| cell[a] >= self.size[a]) {
+            return false;
+        }
+        let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
+        let chunk = |c: u32| (c / CHUNK) as usize;
+        let chunk = &self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)];
+        chunk.as_ref().is_some_and(|chunk| chunk.has_block([x, y, z], exponent))
     }
 
     fn bytes(&self) -> u64 {
@@ -49,8 +61,9 @@ impl Grid {
     pub(crate) const LONGEST: u32 = 1 << 30;
 
     /// Returns the byte of a cell.
+    #[inline(always)]
     pub(crate) fn value(&self, cell: [i32; 3]) -> u8 {
-        let [x, y, z] = cell.map(|c| c as u32);
+        let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         self.voxels.get(x, y, z)
     }
 

@@ -49,6 +49,11 @@ impl Lamp {
         }
     }
 
+    /// Returns the direction to a light that is parallel.
+    pub(crate) fn direction(&self) -> Option<DVec3> {
+        self.everywhere.flatten().map(|arriving| arriving.to_light)
+    }
+
     /// Returns how far a shadow ray goes: to the light, or to the cell that gives it off, which does not block
     /// its own light.
     pub(crate) fn shadow_end(&self, ray: &Ray, distance: f64) -> f64 {

@@ -7,14 +7,17 @@
 //!
 //! - [`Voxel`] is the renderer, [`Factory`] makes it for a registry.
 //! - `occupancy` answers where in a chunk is nothing, `grid` puts chunks together and keeps them over edits.
+//! - `beam` finds where the rays of a tile can meet anything; `paint` draws the tiles.
 //! - `walk` follows one ray through one grid; `world` finds what a ray meets among many; `trace` colors it.
 //!
 //! Colors are drawn with one sample a pixel, through its middle, whatever number is needed.
 
+mod beam;
 mod grid;
 mod lamps;
 mod model;
 mod occupancy;
+mod paint;
 mod renderer;
 mod trace;
 mod tree;

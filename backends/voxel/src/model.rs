@@ -74,7 +74,9 @@ pub(crate) fn build(
         }
         let made = match skipped {
             Some(why) => Err(why),
-            None => converter.voxels(scene, object, detail(object, need, resolution)).map_err(|e| e.reason),
+            None => converter
+                .voxels(scene, object, detail(object, need, resolution), control.threads)
+                .map_err(|e| e.reason),
         };
         match made {
             Err(why) if object.required && object.visible => {

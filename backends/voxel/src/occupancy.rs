@@ -38,12 +38,14 @@ pub(crate) struct Occupancy {
 const OCTET: u64 = 0x0033_0033;
 
 /// Returns the bit of a cell's block of `4^n` cells within the node above it, `shift` = 2n: x fastest, then y.
+#[inline(always)]
 fn child([x, y, z]: [u32; 3], shift: u32) -> usize {
     ((x >> shift & 3) | (y >> shift & 3) << 2 | (z >> shift & 3) << 4) as usize
 }
 
 /// Returns the exponent of the empty block around an empty child: its own, or one more where all of its octet is
 /// empty.
+#[inline(always)]
 fn empty(mask: u64, child: usize, exponent: u32) -> u32 {
     exponent + u32::from(mask >> (child & 0b10_1010) & OCTET == 0)
 }
@@ -99,9 +101,19 @@ impl Occupancy {
         }
     }
 
+    /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells around a cell.
+    pub(crate) fn has_block(&self, cell: [u32; 3], exponent: u32) -> bool {
+        let high = child(cell, 4);
+        match exponent {
+            2 => self.middle[high] >> child(cell, 2) & 1 == 1,
+            4 => self.top >> high & 1 == 1,
+            _ => self.top != 0,
+        }
+    }
+
     /// Returns the exponent `e` of an aligned block of `2^e` cells around a cell that is empty, or nothing when
     /// the cell is marked. Only the six lowest bits of the coordinates count.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn empty_around(&self, cell: [u32; 3]) -> Option<u32> {
         let high = child(cell, 4);
         if self.top >> high & 1 == 0 {

@@ -4,12 +4,11 @@ use crate::grid::{Chunks, Grid};
 use crate::lamps::Lamp;
 use crate::model::{self, Model};
 use crate::occupancy::{Occupancy, Values};
-use crate::trace::{Shadows, Tracer, Wants};
+use crate::paint::{Painter, TILE};
+use crate::trace::{Shadows, Tracer};
 use crate::world::{Counts, Item, World};
-use glam::Vec3;
-use polyptych_core::camera::View;
 use polyptych_core::convert::Converter;
-use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
+use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::scene::{AlphaMode, Chunk, Object, Scene, Shape, ShapeKind};
 use polyptych_core::seam::{
     BackendFactory, BackendInfo, Control, Counter, Decision, Frame, Need, ObjectPlan, Parameter,
@@ -18,9 +17,6 @@ use polyptych_core::seam::{
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-
-/// Edge of a tile in pixels, and rows of a band: rays of a tile meet the same chunks.
-const TILE: u32 = 16;
 
 /// Makes instances of [`Voxel`].
 #[derive(Clone, Copy, Debug, Default)]
@@ -226,10 +222,7 @@ impl Renderer for Voxel {
     ) -> Result<Report, RenderError> {
         let ready = self.ready.as_ref().ok_or(RenderError::NotPrepared)?;
         let mut phases = Phases::start();
-        let painter = Painter {
-            view: frame.camera.view(target.width(), target.height()),
-            wants: wants(target.channels()),
-        };
+        let painter = Painter::new(&frame.camera, target);
         let [rays, shadow_rays, steps] = [const { AtomicU64::new(0) }; 3];
         let stopped = AtomicBool::new(false);
         target.for_each_band(control.threads, TILE, &|mut band| {
@@ -290,38 +283,4 @@ fn plan_object(scene: &Scene, object: &Object, need: &Need, resolution: u32, is_
     let forecast = Converter::default().voxels_forecast(scene, object, detail);
     let decision = model::converted(&object.shape, forecast.bound, &forecast.builds);
     plan(decision, forecast.builds, forecast.bytes)
-}
-
-/// Returns what must be found out for some channels; what is not asked for is not computed.
-fn wants(channels: Channels) -> Wants {
-    Wants { color: channels.has(Channel::Color), shadow: channels.has(Channel::Shadow) }
-}
-
-/// Draws bands of a picture.
-struct Painter<'a> {
-    view: View<'a>,
-    wants: Wants,
-}
-
-impl Painter<'_> {
-    /// Draws a band tile by tile; false where the host stopped it.
-    fn paint(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
-        for first in (0..band.width).step_by(TILE as usize) {
-            if control.is_cancelled() {
-                return false;
-            }
-            for row in 0..band.rows {
-                for x in first..(first + TILE).min(band.width) {
-                    let (u, v) = (f64::from(x) + 0.5, f64::from(band.first_row + row) + 0.5);
-                    let pixel = match self.view.ray(u, v) {
-                        Some(ray) => tracer.look(ray, self.wants),
-                        // Outside of a fisheye's circle there is nothing to see, not even a background.
-                        None => Pixel::background(Vec3::ZERO),
-                    };
-                    band.put(x, row, &pixel);
-                }
-            }
-        }
-        true
-    }
 }

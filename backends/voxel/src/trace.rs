@@ -1,7 +1,6 @@
 //! What color does a ray see, and what is the first surface on its way?
 
-use crate::tree::WorldRay;
-use crate::world::{Counts, Place, Point, Start, World};
+use crate::world::{Counts, Met, Place, Point, Reach, Start, World};
 use glam::{DVec3, Vec3};
 use polyptych_core::framebuffer::Pixel;
 use polyptych_core::math::Ray;
@@ -42,26 +41,43 @@ struct Lit {
 
 impl Tracer<'_> {
     /// Follows a ray from the eye: returns its color, and what geometry channels hold of the first surface.
-    pub(crate) fn look(&self, ray: Ray, wants: Wants) -> Pixel {
-        self.follow(ray, Start::Eye, wants, self.bounces, 1.0)
+    pub(crate) fn look(&self, ray: &Ray, wants: Wants) -> Pixel {
+        self.counts.rays.set(self.counts.rays.get() + 1);
+        let met = self.world.meet(ray, Start::Eye, Place::START, &self.counts);
+        self.color(ray, met, &[], wants)
     }
 
-    /// Follows a ray through all layers; `weight` is the share of the picture that depends on it.
-    fn follow(&self, ray: Ray, start: Start<'_>, wants: Wants, bounces: u32, weight: f64) -> Pixel {
-        self.counts.rays.set(self.counts.rays.get() + 1);
+    /// Does the same where the first surface is known; `lights` tell for some lamps what shadow rays may meet.
+    pub(crate) fn color(&self, ray: &Ray, met: Option<Met>, lights: &[Option<Reach>], wants: Wants) -> Pixel {
+        // Most rays are done with one opaque surface, or none.
+        self.follow(ray, Start::Eye, met, lights, wants, self.bounces, 1.0)
+    }
+
+    /// Follows a ray from its first surface through all layers; `weight` is the share of the picture that depends
+    /// on it.
+    fn follow(
+        &self,
+        ray: &Ray,
+        start: Start<'_>,
+        met: Option<Met>,
+        lights: &[Option<Reach>],
+        wants: Wants,
+        bounces: u32,
+        weight: f64,
+    ) -> Pixel {
         let environment = &self.world.scene.environment;
-        let ray = WorldRay::new(ray);
         let (mut color, mut clear) = (DVec3::ZERO, 1.0);
         let mut first: Option<Pixel> = None;
-        let mut after = Place::START;
+        let mut next = met;
         loop {
-            let Some(met) = self.world.meet(&ray, start, after, &self.counts) else {
-                color += environment.background.color(ray.ray.direction).as_dvec3() * clear;
+            let Some(met) = next else {
+                color += environment.background.color(ray.direction).as_dvec3() * clear;
                 break;
             };
-            let point = self.world.point(&ray.ray, &met);
+            let point = self.world.point(ray, &met);
             let asked = Wants { shadow: wants.shadow && first.is_none(), ..wants };
-            let lit = self.light(&point, -ray.ray.direction, asked);
+            let lights = if first.is_none() { lights } else { &[] };
+            let lit = self.light(&point, -ray.direction, lights, asked);
             if first.is_none() {
                 first = Some(seen(&point, met.place.t, lit.shadow));
             }
@@ -69,13 +85,13 @@ impl Tracer<'_> {
                 break;
             }
             let share = clear * f64::from(point.opacity);
-            let shaded = self.mirrored(&ray.ray, &point, lit.color, bounces, weight * share);
+            let shaded = self.mirrored(ray, &point, lit.color, bounces, weight * share);
             color += fogged(environment, shaded, met.place.t).as_dvec3() * share;
             clear -= share;
             if clear < OPAQUE {
                 break;
             }
-            after = met.place;
+            next = self.world.meet(ray, start, met.place, &self.counts);
         }
         let color = finite(color.as_vec3());
         Pixel { color, ..first.unwrap_or(Pixel::background(color)) }
@@ -92,12 +108,16 @@ impl Tracer<'_> {
         let direction = (ray.direction - point.normal * (2.0 * incoming)).normalize_or(point.normal);
         let mirror = Ray { origin: point.lifted, direction };
         let wants = Wants { color: true, shadow: false };
-        let seen = self.follow(mirror, Start::Surface(&point.site), wants, bounces - 1, weight);
+        let start = Start::Surface(&point.site);
+        self.counts.rays.set(self.counts.rays.get() + 1);
+        let met = self.world.meet(&mirror, start, Place::START, &self.counts);
+        let seen = self.follow(&mirror, start, met, &[], wants, bounces - 1, weight);
         color.lerp(seen.color, share)
     }
 
     /// Lights a point of a surface.
-    fn light(&self, point: &Point<'_>, to_eye: DVec3, wants: Wants) -> Lit {
+    #[inline(always)]
+    fn light(&self, point: &Point<'_>, to_eye: DVec3, lights: &[Option<Reach>], wants: Wants) -> Lit {
         if !wants.color && !wants.shadow {
             return Lit { color: Vec3::ZERO, shadow: 1.0 };
         }
@@ -110,7 +130,7 @@ impl Tracer<'_> {
         };
         let mut color = if wants.color { surface.ambient(environment) } else { Vec3::ZERO };
         let (mut casting, mut reaching) = (0u32, 0u32);
-        for lamp in &self.world.lamps {
+        for (index, lamp) in self.world.lamps.iter().enumerate() {
             let Some(arriving) = lamp.arriving(point.position) else { continue };
             casting += u32::from(lamp.casts_shadow);
             if turned_away(point.normal, arriving.to_light) {
@@ -127,9 +147,10 @@ impl Tracer<'_> {
             }
             if lamp.casts_shadow && self.shadows == Shadows::Hard {
                 self.counts.shadow_rays.set(self.counts.shadow_rays.get() + 1);
-                let ray = WorldRay::new(Ray { origin: point.lifted, direction: arriving.to_light });
-                let end = lamp.shadow_end(&ray.ray, arriving.distance);
-                if self.world.is_blocked(&ray, &point.site, end, &self.counts) {
+                let ray = Ray { origin: point.lifted, direction: arriving.to_light };
+                let end = lamp.shadow_end(&ray, arriving.distance);
+                let reach = lights.get(index).and_then(Option::as_ref);
+                if self.world.is_blocked(&ray, &point.site, end, reach, &self.counts) {
                     continue;
                 }
             }
@@ -153,6 +174,7 @@ fn seen(point: &Point<'_>, distance: f64, shadow: f32) -> Pixel {
     }
 }
 
-fn finite(v: Vec3) -> Vec3 {
+#[inline(always)]
+pub(crate) fn finite(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
 }

@@ -1,5 +1,6 @@
 //! Which of many boxes may a ray meet? A bounding volume hierarchy over the objects of a scene.
 
+use crate::beam::Beam;
 use glam::DVec3;
 use polyptych_core::math::{Aabb, Ray};
 
@@ -118,6 +119,28 @@ impl Tree {
             len -= 1;
             current = (waiting[len], waiting_from[len]);
         }
+    }
+
+    /// Visits the entries whose boxes a beam may touch, until a visit returns false; false if one did.
+    pub(crate) fn visit_beam(&self, beam: &Beam, visit: &mut impl FnMut(usize) -> bool) -> bool {
+        let (mut waiting, mut len) = ([0u32; DEEPEST + 1], usize::from(!self.nodes.is_empty()));
+        while len > 0 {
+            len -= 1;
+            let node = &self.nodes[waiting[len] as usize];
+            if !beam.touches(&node.bounds) {
+                continue;
+            }
+            if node.count == 0 {
+                (waiting[len], waiting[len + 1]) = (node.first, node.first + 1);
+                len += 2;
+                continue;
+            }
+            let entries = &self.order[node.first as usize..(node.first + node.count) as usize];
+            if !entries.iter().all(|&entry| visit(entry as usize)) {
+                return false;
+            }
+        }
+        true
     }
 
     /// Returns the bytes held.

@@ -1,6 +1,7 @@
 //! What does a ray meet first among all grids of a scene, and is anything between a point and a light?
 
-use crate::grid::Grid;
+use crate::beam::{Beam, Bundle, Span};
+use crate::grid::{Grid, Layer};
 use crate::lamps::Lamp;
 use crate::tree::{Tree, WorldRay};
 use crate::walk::{Found, GridRay, Moment, Walk};
@@ -76,11 +77,51 @@ pub(crate) struct Site {
 }
 
 /// The surface that a ray met.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Met {
     pub(crate) place: Place,
-    walk: Walk,
+    /// Where the walk entered the cell; see [`Walk::point`].
+    origin: DVec3,
+    /// See [`Walk::cell_before`].
+    cell_before: [i32; 3],
+    /// See [`Walk::face`].
+    face: u8,
     value: u8,
+    began_inside: bool,
+}
+
+impl Met {
+    fn new(place: Place, walk: &Walk, value: u8) -> Self {
+        Self {
+            place,
+            origin: walk.point(),
+            cell_before: walk.cell_before(),
+            face: walk.face() as u8,
+            value,
+            began_inside: walk.entered.is_none(),
+        }
+    }
+}
+
+/// The grids that the rays of a tile may meet, and where.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reach {
+    count: usize,
+    grids: [Option<(u32, Span)>; MOST_GRIDS],
+}
+
+/// A tile that sees more grids has its rays go through the tree.
+const MOST_GRIDS: usize = 6;
+
+impl Reach {
+    /// Tells whether there is nothing to be met.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (usize, &Span)> {
+        self.grids.iter().flatten().map(|(index, span)| (*index as usize, span))
+    }
 }
 
 /// A point of a surface with all that shading needs, in world space.
@@ -118,15 +159,22 @@ impl Item {
         Self { object, grid, grid_from_world, normals, radius: thing.bounds().radius(), without_holes }
     }
 
+    #[inline(always)]
     fn grid_ray(&self, ray: &Ray) -> Option<GridRay> {
         let direction = self.grid_from_world.transform_vector3(ray.direction);
         GridRay::new(self.grid_from_world.transform_point3(ray.origin), direction)
     }
 
-    /// Begins the walk of a ray that leaves a surface of this grid.
-    fn walk_from(&self, site: &Site, direction: DVec3) -> Option<Walk> {
-        let direction = self.grid_from_world.transform_vector3(direction);
-        Walk::begin_in(GridRay::new(site.origin, direction)?, self.grid.seen.size, site.cell)
+    /// Returns the ray that leaves a surface of this grid.
+    #[inline(always)]
+    fn ray_from(&self, site: &Site, direction: DVec3) -> Option<GridRay> {
+        GridRay::new(site.origin, self.grid_from_world.transform_vector3(direction))
+    }
+
+    /// Returns the largest number at hand for a point of this grid seen from a distance.
+    #[inline(always)]
+    fn reach_of(&self, position: DVec3, t: f64) -> f64 {
+        position.abs().max_element().max(t).max(self.radius)
     }
 
     /// Tells whether a surface is there at all, and whether it blocks light.
@@ -159,17 +207,52 @@ impl World {
             + self.tree.bytes()
     }
 
-    /// Finds the first surface behind a place.
-    pub(crate) fn meet(
-        &self,
-        ray: &WorldRay,
-        start: Start<'_>,
-        after: Place,
-        counts: &Counts,
-    ) -> Option<Met> {
+    /// Finds which grids rays may meet, and where in them cells are marked in a layer. Nothing where the rays go
+    /// apart too far, or see too many grids.
+    pub(crate) fn reach(&self, bundle: &Bundle<'_>, layer: fn(&Grid) -> &Layer) -> Option<Reach> {
+        let mut reach = Reach { count: 0, grids: [None; MOST_GRIDS] };
+        let beam = Beam::of(bundle, &DAffine3::IDENTITY)?;
+        let is_whole = self.tree.visit_beam(&beam, &mut |index| {
+            let item = &self.items[index];
+            let Some(beam) = Beam::of(bundle, &item.grid_from_world) else { return false };
+            let Some(span) = beam.span(layer(&item.grid)) else { return true };
+            let Some(place) = reach.grids.get_mut(reach.count) else { return false };
+            *place = Some((index as u32, span));
+            reach.count += 1;
+            true
+        });
+        is_whole.then_some(reach)
+    }
+
+    /// Finds the first surface that a ray from the eye meets, among what its tile can reach.
+    #[inline(always)]
+    pub(crate) fn meet_within(&self, ray: &Ray, reach: &Reach, counts: &Counts) -> Option<Met> {
         let mut best: Option<Met> = None;
-        self.tree.visit(ray, f64::INFINITY, &mut |index, before| {
-            let found = self.meet_one(index, ray, start, after, before, counts);
+        for (index, span) in reach.iter() {
+            let item = &self.items[index];
+            let Some(grid_ray) = item.grid_ray(ray) else { continue };
+            let (enter, leave) = span.distances(&grid_ray);
+            let moment = if enter > 0.0 { Moment::before(enter) } else { Moment::START };
+            let Some(walk) = Walk::begin(grid_ray, item.grid.seen.size, moment) else { continue };
+            let before = best.map_or(f64::INFINITY, |met| met.place.t).min(leave);
+            let found = self.first_surface(index, walk, None, Place::START, before, counts);
+            if let Some(met) = found
+                && best.is_none_or(|best| met.place < best.place)
+            {
+                best = Some(met);
+            }
+        }
+        best
+    }
+
+    /// Finds the first surface behind a place.
+    pub(crate) fn meet(&self, ray: &Ray, start: Start<'_>, after: Place, counts: &Counts) -> Option<Met> {
+        let mut best: Option<Met> = None;
+        self.tree.visit(&WorldRay::new(*ray), f64::INFINITY, &mut |index, before| {
+            let begun = self.begin(index, ray, start, after);
+            let found = begun.and_then(|(walk, previous)| {
+                self.first_surface(index, walk, previous, after, before, counts)
+            });
             match (&best, found) {
                 (Some(old), Some(new)) if new.place >= old.place => {}
                 (_, Some(new)) => best = Some(new),
@@ -180,17 +263,18 @@ impl World {
         best
     }
 
-    fn meet_one(
+    /// Follows a walk to the first surface behind a place; `previous` is the value of the cell before its first.
+    #[inline(always)]
+    fn first_surface(
         &self,
         index: usize,
-        ray: &WorldRay,
-        start: Start<'_>,
+        mut walk: Walk,
+        mut previous: Option<u8>,
         after: Place,
         before: f64,
         counts: &Counts,
     ) -> Option<Met> {
         let item = &self.items[index];
-        let (mut walk, mut previous) = self.begin(index, &ray.ray, start, after)?;
         let found = loop {
             let marked = walk.find_marked(&item.grid.seen, before);
             let Found::Marked { passed_empty } = marked else { break None };
@@ -210,7 +294,7 @@ impl World {
             }
         };
         counts.steps.set(counts.steps.get() + u64::from(walk.steps));
-        found.map(|(place, value)| Met { place, walk, value })
+        found.map(|(place, value)| Met::new(place, &walk, value))
     }
 
     /// Begins a walk at a place of its ray; returns the value of the cell there too, unless the cell is to be
@@ -224,11 +308,11 @@ impl World {
         };
         let grid_ray = match start {
             Start::Surface(site) if site.item == index => {
+                let grid_ray = item.ray_from(site, ray.direction)?;
                 if after.t <= 0.0 {
-                    return known(item.walk_from(site, ray.direction)?);
+                    return known(Walk::begin_in(grid_ray, size, site.cell)?);
                 }
-                let direction = item.grid_from_world.transform_vector3(ray.direction);
-                GridRay::new(site.origin, direction)?
+                grid_ray
             }
             _ => item.grid_ray(ray)?,
         };
@@ -239,30 +323,54 @@ impl World {
         if walk.entered.is_some() || from_eye { Some((walk, None)) } else { known(walk) }
     }
 
-    /// Tells whether anything blocks light between a surface and a distance along a ray.
-    pub(crate) fn is_blocked(&self, ray: &WorldRay, site: &Site, before: f64, counts: &Counts) -> bool {
+    /// Tells whether anything blocks light between a surface and a distance along a ray; `reach` are the grids
+    /// that it may meet, where that is known.
+    #[inline(always)]
+    pub(crate) fn is_blocked(
+        &self,
+        ray: &Ray,
+        site: &Site,
+        before: f64,
+        reach: Option<&Reach>,
+        counts: &Counts,
+    ) -> bool {
+        if let Some(reach) = reach {
+            return reach.iter().any(|(i, span)| self.blocks(i, ray, site, before, Some(span), counts));
+        }
         let mut blocked = false;
-        self.tree.visit(ray, before, &mut |index, before| {
-            blocked = blocked || self.blocks(index, ray, site, before, counts);
+        self.tree.visit(&WorldRay::new(*ray), before, &mut |index, before| {
+            blocked = blocked || self.blocks(index, ray, site, before, None, counts);
             if blocked { f64::NEG_INFINITY } else { before }
         });
         blocked
     }
 
-    fn blocks(&self, index: usize, ray: &WorldRay, site: &Site, before: f64, counts: &Counts) -> bool {
+    #[inline(always)]
+    fn blocks(
+        &self,
+        index: usize,
+        ray: &Ray,
+        site: &Site,
+        before: f64,
+        span: Option<&Span>,
+        counts: &Counts,
+    ) -> bool {
         let item = &self.items[index];
         let layer = &item.grid.blocking;
         let own = site.item == index;
+        let grid_ray = if own { item.ray_from(site, ray.direction) } else { item.grid_ray(ray) };
+        let Some(grid_ray) = grid_ray else { return false };
         let walk = if own {
-            item.walk_from(site, ray.ray.direction)
+            Walk::begin_in(grid_ray, layer.size, site.cell)
         } else {
-            item.grid_ray(&ray.ray).and_then(|r| Walk::begin(r, layer.size, Moment::START))
+            Walk::begin(grid_ray, layer.size, Moment::START)
         };
+        let last = span.map_or(before, |span| span.distances(&grid_ray).1.min(before));
         let Some(mut walk) = walk else { return false };
         // The cell in front of a surface was passed before: what it holds let the ray through.
         let mut previous = (own && !site.is_within_solid).then(|| item.grid.value(walk.cell()));
         let blocked = loop {
-            let Found::Marked { passed_empty } = walk.find_marked(layer, before) else { break false };
+            let Found::Marked { passed_empty } = walk.find_marked(layer, last) else { break false };
             if walk.t >= before {
                 break false;
             }
@@ -283,18 +391,26 @@ impl World {
         blocked
     }
 
+    /// Grows a box to hold the points from which shadow rays leave a surface that a ray met.
+    #[inline(always)]
+    pub(crate) fn with_site(&self, sites: Aabb, ray: &Ray, met: &Met) -> Aabb {
+        let position = ray.at(met.place.t);
+        let lift = self.items[met.place.item as usize].reach_of(position, met.place.t) * LIFT;
+        sites.with(position - lift).with(position + lift)
+    }
+
     /// Returns what shading needs of a surface that a ray met.
+    #[inline(always)]
     pub(crate) fn point(&self, ray: &Ray, met: &Met) -> Point<'_> {
         let index = met.place.item as usize;
         let item = &self.items[index];
-        let (walk, face) = (&met.walk, met.walk.face());
-        let origin = walk.point();
+        let (origin, face) = (met.origin, usize::from(met.face));
         let material = self.scene.material(&self.scene.objects[item.object], usize::from(met.value) - 1);
         let outward = outward(face);
         let (color, opacity) =
             self.scene.base_color(material, None, origin.as_vec3(), outward.as_vec3(), 0.0);
         let position = ray.at(met.place.t);
-        let reach = position.abs().max_element().max(met.place.t).max(item.radius);
+        let reach = item.reach_of(position, met.place.t);
         Point {
             object: item.object,
             position,
@@ -303,12 +419,7 @@ impl World {
             color,
             opacity: material.effective_opacity(opacity).min(1.0),
             lifted: position + item.normals[face] * (reach * LIFT),
-            site: Site {
-                item: index,
-                origin,
-                cell: walk.cell_before(),
-                is_within_solid: walk.entered.is_none(),
-            },
+            site: Site { item: index, origin, cell: met.cell_before, is_within_solid: met.began_inside },
         }
     }
 }

@@ -9,7 +9,7 @@ use super::palette::{ColorCollector, ColorKey, triangle_color};
 use crate::math::Aabb;
 use crate::parallel::{Threads, for_each_mut};
 use crate::scene::{Mesh, Object, Scene};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
 /// Returns the number of samples along each axis and their distance.
@@ -46,24 +46,29 @@ pub(super) fn of_mesh(
     let grid = Grid { size, step, first };
     let mut nearest = nearest_triangles(mesh, &grid, threads);
     let open = is_open(mesh);
-    let inside = if open { vec![false; nearest.len()] } else { inside_votes(mesh, &grid) };
+    let inside = if open { vec![false; nearest.len()] } else { inside_votes(mesh, &grid, threads) };
     let band = step * DistanceModel::BAND;
 
-    let mut colors = ColorCollector::default();
-    let keys: Vec<Option<ColorKey>> = (0..nearest.len())
-        .map(|i| {
-            let near = &mut nearest[i];
-            let triangle = near.triangle?;
-            let corners = mesh.corners(triangle as usize).map(glam::Vec3::as_dvec3);
-            let weights = closest_weights(corners, grid.sample(i)).as_vec3();
-            let color = triangle_color(scene, object, mesh, triangle as usize, weights);
-            if color.is_none() {
-                // A hole of the texture: nothing is near.
-                near.distance = band;
+    let mut noted: Vec<Option<(ColorKey, Vec3)>> = vec![None; nearest.len()];
+    let mut pairs: Vec<_> = nearest.iter_mut().zip(&mut noted).collect();
+    for_each_mut(threads, &mut pairs, 4096, &|i, (near, noted)| {
+        let Some(triangle) = near.triangle else { return };
+        let corners = mesh.corners(triangle as usize).map(glam::Vec3::as_dvec3);
+        let weights = closest_weights(corners, grid.sample(i)).as_vec3();
+        match triangle_color(scene, object, mesh, triangle as usize, weights) {
+            Some(color) => {
+                let slot = mesh.slot(triangle as usize) as u16;
+                **noted = Some((ColorCollector::key(slot, color), color));
             }
-            Some(colors.note(mesh.slot(triangle as usize) as u16, color?))
-        })
-        .collect();
+            // A hole of the texture: nothing is near.
+            None => near.distance = band,
+        }
+    });
+    drop(pairs);
+    let mut colors = ColorCollector::default();
+    for &(key, color) in noted.iter().flatten() {
+        colors.note(key, color, 1);
+    }
     let palette = colors.choose(scene, object);
     let distances = nearest
         .iter()
@@ -87,7 +92,7 @@ pub(super) fn of_mesh(
         first,
         step,
         distances,
-        colors: keys.iter().map(|key| key.map_or(0, |k| palette.byte(k))).collect(),
+        colors: noted.iter().map(|noted| noted.map_or(0, |(key, _)| palette.byte(key))).collect(),
         palette: palette.materials,
         bound: bound(step) + if open { step * 0.75 } else { 0.0 },
         why: format!("{x}x{y}x{z} signed distances{sheet}"),
@@ -219,12 +224,15 @@ fn is_open(mesh: &Mesh) -> bool {
 }
 
 /// Tells for each sample whether it is inside, by the majority of three parity counts.
-fn inside_votes(mesh: &Mesh, grid: &Grid) -> Vec<bool> {
-    let mut votes = vec![0u8; grid.size.iter().map(|&s| s as usize).product()];
-    for axis in 0..3 {
-        count_crossings(mesh, grid, axis, &mut votes);
-    }
-    votes.into_iter().map(|v| v >= 2).collect()
+fn inside_votes(mesh: &Mesh, grid: &Grid, threads: &dyn Threads) -> Vec<bool> {
+    let count = grid.size.iter().map(|&s| s as usize).product();
+    let mut votes = [const { Vec::new() }; 3];
+    for_each_mut(threads, &mut votes, 1, &|axis, votes| {
+        *votes = vec![0u8; count];
+        count_crossings(mesh, grid, axis, votes);
+    });
+    let [x, y, z] = &votes;
+    (0..count).map(|i| x[i] + y[i] + z[i] >= 2).collect()
 }
 
 /// Casts a line through every row of samples along an axis and adds a vote to those behind an odd number of

@@ -10,7 +10,7 @@
 use crate::math::Aabb;
 use crate::parallel::{Threads, for_each_mut};
 use crate::scene::{FreeForm, Mesh, Volume};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 use std::collections::HashMap;
 
 /// Most cells along an edge.
@@ -20,6 +20,9 @@ pub(super) const FINEST: u32 = 256;
 trait Field: Sync {
     fn value(&self, p: DVec3) -> f64;
     fn gradient(&self, p: DVec3) -> DVec3;
+    fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        (self.value(p), self.gradient(p))
+    }
 }
 
 impl Field for FreeForm {
@@ -28,6 +31,9 @@ impl Field for FreeForm {
     }
     fn gradient(&self, p: DVec3) -> DVec3 {
         self.form().value_and_gradient(p).1
+    }
+    fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        self.form().value_and_gradient(p)
     }
 }
 
@@ -64,7 +70,7 @@ pub(super) fn of_form(form: &FreeForm, tolerance: f64, finest: u32, threads: &dy
     let mut last_worst = f64::INFINITY;
     loop {
         let grid = Grid::around(&form.bounds(), resolution);
-        let cells = grid.cells_by_intervals(form);
+        let cells = grid.cells_by_intervals(form, threads);
         let mesh = contour(form, &grid, &cells, threads);
         let (worst, most) = deviation(form, &mesh, grid.cell, threads);
         // On smooth parts the error falls to a quarter with each halving of the cells; where creases meet, only
@@ -91,7 +97,7 @@ pub(super) fn forecast(form: &FreeForm, tolerance: f64, finest: u32) -> (f64, f6
 }
 
 /// Triangulates the surface of a volume at the resolution of its samples; the bound is a cell's diagonal.
-pub(super) fn of_volume(volume: &Volume) -> (Mesh, f64) {
+pub(super) fn of_volume(volume: &Volume, threads: &dyn Threads) -> (Mesh, f64) {
     let surface =
         VolumeSurface { volume, bounds: volume.bounds(), level: f64::from(volume.transfer.surface_value()) };
     let grid = Grid {
@@ -101,7 +107,7 @@ pub(super) fn of_volume(volume: &Volume) -> (Mesh, f64) {
         size: volume.size().map(|s| s + 1),
     };
     let cells = surface_cells(volume);
-    let mut mesh = contour(&surface, &grid, &cells, &crate::parallel::OneThread);
+    let mut mesh = contour(&surface, &grid, &cells, threads);
     mesh.colors = mesh
         .positions
         .iter()
@@ -151,6 +157,9 @@ fn surface_cells(volume: &Volume) -> Vec<[u32; 3]> {
     cells
 }
 
+/// Cells along the edge of what one thread looks through.
+const BLOCK: u32 = 32;
+
 /// A box of cells.
 struct Grid {
     first: DVec3,
@@ -180,9 +189,16 @@ impl Grid {
     }
 
     /// Lists the cells in which the form may vanish.
-    fn cells_by_intervals(&self, form: &FreeForm) -> Vec<[u32; 3]> {
-        let mut cells = Vec::new();
-        self.subdivide(form, [0; 3], self.size, &mut cells);
+    fn cells_by_intervals(&self, form: &FreeForm, threads: &dyn Threads) -> Vec<[u32; 3]> {
+        let count = self.size.map(|edge| edge.div_ceil(BLOCK) as usize);
+        let mut blocks = vec![Vec::new(); count.iter().product()];
+        for_each_mut(threads, &mut blocks, 1, &|i, cells| {
+            let block = [i % count[0], i / count[0] % count[1], i / (count[0] * count[1])];
+            let from = block.map(|b| b as u32 * BLOCK);
+            let to = std::array::from_fn(|a| (from[a] + BLOCK).min(self.size[a]));
+            self.subdivide(form, from, to, cells);
+        });
+        let mut cells = blocks.concat();
         cells.sort_unstable_by_key(|&c| self.index(c));
         cells
     }
@@ -233,17 +249,21 @@ fn contour(field: &impl Field, grid: &Grid, cells: &[[u32; 3]], threads: &dyn Th
             positions.push(vertex);
         }
     }
-    let mut triangles = Vec::new();
+    let mut quads = Vec::new();
     for (cell, surface) in cells.iter().zip(&surfaces) {
         for axis in 0..3 {
             if surface.crossing[axis] != 0
                 && let Some(quad) = quad_around_edge(grid, &vertex_of, *cell, axis, surface.crossing[axis])
             {
-                split_quad(quad, &positions, field, &mut triangles);
+                quads.push((quad, [[0; 3]; 2]));
             }
         }
     }
-    with_normals(field, &positions, &triangles)
+    for_each_mut(threads, &mut quads, 512, &|_, (quad, halves)| {
+        *halves = split_quad(*quad, &positions, field);
+    });
+    let triangles: Vec<[u32; 3]> = quads.into_iter().flat_map(|(_, halves)| halves).collect();
+    with_normals(field, &positions, &triangles, threads)
 }
 
 fn cell_surface(field: &impl Field, grid: &Grid, cell: [u32; 3]) -> CellSurface {
@@ -257,7 +277,7 @@ fn cell_surface(field: &impl Field, grid: &Grid, cell: [u32; 3]) -> CellSurface 
     let mut count = 0;
     for (a, b) in EDGES {
         if inside[a] != inside[b] {
-            let p = crossing_point(field, corner(a), corner(b), values[a]);
+            let p = crossing_point(field, corner(a), corner(b), values[a], values[b]);
             points[count] = (p, field.gradient(p).normalize_or_zero());
             count += 1;
         }
@@ -270,19 +290,35 @@ fn cell_surface(field: &impl Field, grid: &Grid, cell: [u32; 3]) -> CellSurface 
     CellSurface { vertex: Some(vertex.clamp(low, low + grid.step)), crossing }
 }
 
-/// Finds where an edge crosses the surface, by bisection to 2^-24 of the edge.
-fn crossing_point(field: &impl Field, a: DVec3, b: DVec3, value_a: f64) -> DVec3 {
+/// Finds where an edge crosses the surface, to 2^-24 of the edge: by the regula falsi, which halves the value of
+/// an end that stays (Illinois), and by bisection where that is slow.
+fn crossing_point(field: &impl Field, a: DVec3, b: DVec3, value_a: f64, value_b: f64) -> DVec3 {
+    const CLOSE: f64 = 1.0 / (1 << 24) as f64;
     let inside = value_a >= 0.0;
-    let (mut near, mut far) = (0.0, 1.0);
-    for _ in 0..24 {
-        let middle = (near + far) * 0.5;
-        if (field.value(a.lerp(b, middle)) >= 0.0) == inside {
-            near = middle;
+    let (mut near, mut far) = ((0.0, value_a), (1.0, value_b));
+    let (mut at, mut moved_near) = (0.5, None);
+    for step in 0..48 {
+        let share: f64 = near.1 / (near.1 - far.1);
+        // Every third step halves: a crease may hold the others back.
+        let next = if step % 3 == 2 || !share.is_finite() { 0.5 } else { share.clamp(0.0, 1.0) };
+        let next = near.0 + (far.0 - near.0) * next;
+        let is_close = (next - at).abs() < CLOSE && step > 0;
+        at = next;
+        if is_close || far.0 - near.0 < CLOSE {
+            break;
+        }
+        let value = field.value(a.lerp(b, at));
+        if (value >= 0.0) == inside {
+            near = (at, value);
+            far.1 *= if moved_near == Some(true) { 0.5 } else { 1.0 };
+            moved_near = Some(true);
         } else {
-            far = middle;
+            far = (at, value);
+            near.1 *= if moved_near == Some(false) { 0.5 } else { 1.0 };
+            moved_near = Some(false);
         }
     }
-    a.lerp(b, (near + far) * 0.5)
+    a.lerp(b, at)
 }
 
 /// Finds the point nearest to all tangent planes, and among those as near as possible to the middle of the
@@ -321,39 +357,44 @@ fn quad_around_edge(
 }
 
 /// Cuts a quad along the diagonal whose middle is nearer to the surface.
-fn split_quad(quad: [u32; 4], positions: &[DVec3], field: &impl Field, triangles: &mut Vec<[u32; 3]>) {
+fn split_quad(quad: [u32; 4], positions: &[DVec3], field: &impl Field) -> [[u32; 3]; 2] {
     let p = quad.map(|i| positions[i as usize]);
     let off = |a: DVec3, b: DVec3| field.value((a + b) * 0.5).abs();
     let [a, b, c, d] = quad;
-    if off(p[0], p[2]) <= off(p[1], p[3]) {
-        triangles.extend([[a, b, c], [a, c, d]]);
-    } else {
-        triangles.extend([[a, b, d], [b, c, d]]);
-    }
+    if off(p[0], p[2]) <= off(p[1], p[3]) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
 }
 
 /// Cosine of the angle up to which the corners of neighboring faces share a normal: 30 degrees.
 const SAME_NORMAL: f32 = 0.866;
 
 /// Gives each corner the gradient a little inside its own triangle, so that creases stay sharp.
-fn with_normals(field: &impl Field, positions: &[DVec3], triangles: &[[u32; 3]]) -> Mesh {
+fn with_normals(
+    field: &impl Field,
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    threads: &dyn Threads,
+) -> Mesh {
+    let mut normals: Vec<Option<[Vec3; 3]>> = vec![None; triangles.len()];
+    for_each_mut(threads, &mut normals, 512, &|t, normals| {
+        let [a, b, c] = triangles[t].map(|i| positions[i as usize]);
+        let flat = (b - a).cross(c - a);
+        let middle = (a + b + c) / 3.0;
+        let normal_at = |p: DVec3| {
+            let normal = -field.gradient(p.lerp(middle, 0.3)).normalize_or_zero();
+            if normal.dot(flat) > 0.0 { normal } else { flat.normalize_or(DVec3::Y) }.as_vec3()
+        };
+        *normals = (flat.length_squared() != 0.0).then(|| [a, b, c].map(normal_at));
+    });
     let mut mesh = Mesh::default();
     let mut variants: Vec<Vec<u32>> = vec![Vec::new(); positions.len()];
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|i| positions[i as usize]);
-        let flat = (b - a).cross(c - a);
-        if flat.length_squared() == 0.0 {
-            continue;
-        }
-        let middle = (a + b + c) / 3.0;
-        let corners = triangle.map(|i| {
-            let p = positions[i as usize];
-            let normal = -field.gradient(p.lerp(middle, 0.3)).normalize_or_zero();
-            let normal = if normal.dot(flat) > 0.0 { normal } else { flat.normalize_or(DVec3::Y) }.as_vec3();
-            let known = &mut variants[i as usize];
+    for (triangle, normals) in triangles.iter().zip(normals) {
+        let Some(normals) = normals else { continue };
+        let corners = std::array::from_fn(|k| {
+            let (i, normal) = (triangle[k] as usize, normals[k]);
+            let known = &mut variants[i];
             let same = known.iter().find(|&&k| mesh.normals[k as usize].dot(normal) > SAME_NORMAL);
             same.copied().unwrap_or_else(|| {
-                mesh.positions.push(p.as_vec3());
+                mesh.positions.push(positions[i].as_vec3());
                 mesh.normals.push(normal);
                 known.push(mesh.positions.len() as u32 - 1);
                 mesh.positions.len() as u32 - 1
@@ -372,8 +413,9 @@ fn deviation(field: &impl Field, mesh: &Mesh, cell: f64, threads: &dyn Threads) 
         let [a, b, c] = mesh.corners(t).map(glam::Vec3::as_dvec3);
         let places = [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0, a];
         *distances = places.map(|p| {
-            let slope = field.gradient(p).length();
-            let distance = if slope > 0.0 { field.value(p).abs() / slope } else { cell };
+            let (value, gradient) = field.value_and_gradient(p);
+            let slope = gradient.length();
+            let distance = if slope > 0.0 { value.abs() / slope } else { cell };
             distance.min(cell * 2.0)
         });
     });
@@ -450,7 +492,7 @@ mod tests {
             crate::scene::TransferPoint { value: -0.5, color: glam::Vec3::ONE, opacity: 0.0 },
             crate::scene::TransferPoint { value: 0.5, color: glam::Vec3::ONE, opacity: 1.0 },
         ];
-        let (mesh, bound) = of_volume(&volume);
+        let (mesh, bound) = of_volume(&volume, &OneThread);
         assert_eq!(open_edges(&mesh), 0);
         let worst = mesh.positions.iter().map(|p| (p.as_dvec3().length() - 8.0).abs()).fold(0.0, f64::max);
         assert!(worst < 0.1 && worst < bound, "{worst}");

@@ -149,7 +149,7 @@ impl Converter {
                     (mesh, bound, why)
                 }
                 Shape::Volume(volume) => {
-                    let (mesh, bound) = field_mesh::of_volume(volume);
+                    let (mesh, bound) = field_mesh::of_volume(volume, threads);
                     let why = format!(
                         "surface at value {:.4} as {} triangles; what is translucent is lost",
                         volume.transfer.surface_value(),
@@ -171,12 +171,13 @@ impl Converter {
         scene: &Scene,
         object: &Object,
         detail: Detail,
+        threads: &dyn Threads,
     ) -> Result<Arc<VoxelModel>, ConvertError> {
         let scale = scale_of(object);
         self.voxels.get(scene, object, detail, |detail| {
-            let mut model =
-                voxelize::voxelize(scene, object, detail.tolerance / scale, detail.max_resolution)
-                    .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
+            let tolerance = detail.tolerance / scale;
+            let mut model = voxelize::voxelize(scene, object, tolerance, detail.max_resolution, threads)
+                .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
             model.bound *= scale;
             Ok(model)
         })

@@ -30,14 +30,24 @@ struct ColorBox {
 }
 
 impl ColorCollector {
-    /// Notes a color and returns its key.
-    pub(super) fn note(&mut self, slot: u16, color: Vec3) -> ColorKey {
+    /// Returns the key of a color.
+    pub(super) fn key(slot: u16, color: Vec3) -> ColorKey {
         let step = |c: f32| (crate::shade::srgb_from_linear(c) * 31.0).round() as u8;
-        let key = (slot, color.to_array().map(step));
+        (slot, color.to_array().map(step))
+    }
+
+    /// Notes colors with one key: their sum and number.
+    pub(super) fn note(&mut self, key: ColorKey, sum: Vec3, count: u32) {
         let entry = self.seen.entry(key).or_insert((Vec3::ZERO, 0));
-        entry.0 += color;
-        entry.1 += 1;
-        key
+        entry.0 += sum;
+        entry.1 += count;
+    }
+
+    /// Adds what another has seen.
+    pub(super) fn merge(&mut self, other: &Self) {
+        for (&key, &(sum, count)) in &other.seen {
+            self.note(key, sum, count);
+        }
     }
 
     /// Chooses at most 255 materials: first one for each slot, then the boxes with the widest colors are cut.
@@ -143,6 +153,12 @@ mod tests {
     use super::*;
     use crate::scene::{Primitive, Shape};
 
+    fn note(colors: &mut ColorCollector, color: Vec3) -> ColorKey {
+        let key = ColorCollector::key(0, color);
+        colors.note(key, color, 1);
+        key
+    }
+
     #[test]
     fn few_colors_are_kept_exactly_and_many_are_cut_to_255() {
         let mut scene = Scene::default();
@@ -150,8 +166,8 @@ mod tests {
         let object = Object::new("o", Shape::Primitive(Primitive::Sphere { radius: 1.0 }), slot);
 
         let mut few = ColorCollector::default();
-        let red = few.note(0, Vec3::X);
-        let green = few.note(0, Vec3::Y);
+        let red = note(&mut few, Vec3::X);
+        let green = note(&mut few, Vec3::Y);
         let palette = few.choose(&scene, &object);
         assert_eq!(palette.materials[usize::from(palette.byte(red)) - 1].base_color, Vec3::X);
         assert_eq!(palette.materials[usize::from(palette.byte(green)) - 1].base_color, Vec3::Y);
@@ -160,7 +176,7 @@ mod tests {
         let keys: Vec<_> = (0..4096)
             .map(|i| {
                 let color = Vec3::new((i % 16) as f32, (i / 16 % 16) as f32, (i / 256) as f32) / 15.0;
-                (many.note(0, color), color)
+                (note(&mut many, color), color)
             })
             .collect();
         let palette = many.choose(&scene, &object);

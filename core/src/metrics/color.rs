@@ -49,16 +49,8 @@ impl ColorErrors {
             (width * height, width * height),
             "pixels of the pictures"
         );
-        let (mut square, mut sum) = (0.0_f64, [0.0_f64; 3]);
-        for (a, b) in picture.iter().zip(reference) {
-            for c in 0..3 {
-                let difference = f64::from(a[c]) - f64::from(b[c]);
-                square += difference * difference;
-                sum[c] += difference;
-            }
-        }
         let count = (width * height).max(1) as f64;
-        let rmse = (square / (3.0 * count)).sqrt();
+        let (rmse, sum) = differences(picture, reference);
         let outside = outliers(picture, reference, width, height);
         let flip = flip_map(picture, reference, width, height);
         Self {
@@ -72,6 +64,19 @@ impl ColorErrors {
             largest_blob: largest_blob(&outside, width),
         }
     }
+}
+
+/// Returns the root of the mean square of the differences, and their sum for each channel.
+pub(super) fn differences(picture: &[[f32; 3]], reference: &[[f32; 3]]) -> (f64, [f64; 3]) {
+    let (mut square, mut sum) = (0.0_f64, [0.0_f64; 3]);
+    for (a, b) in picture.iter().zip(reference) {
+        for c in 0..3 {
+            let difference = f64::from(a[c]) - f64::from(b[c]);
+            square += difference * difference;
+            sum[c] += difference;
+        }
+    }
+    ((square / (3.0 * picture.len().max(1) as f64)).sqrt(), sum)
 }
 
 fn worst_tile(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize, height: usize) -> f64 {

@@ -8,10 +8,16 @@ pub(super) fn separable(plane: &[f32], width: usize, along_x: &[f32], along_y: &
     let height = plane.len() / width;
     let mut rows = vec![0.0; plane.len()];
     let radius = along_x.len() / 2;
+    // A row with its borders drawn out, so that the sums run over neighbors without asking where they are.
+    let mut wide = vec![0.0; width + 2 * radius];
     for (source, target) in plane.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
-        for (x, out) in target.iter_mut().enumerate() {
-            let place = |k: usize| (x + k).saturating_sub(radius).min(width - 1);
-            *out = along_x.iter().enumerate().map(|(k, w)| w * source[place(k)]).sum();
+        wide[..radius].fill(source[0]);
+        wide[radius..radius + width].copy_from_slice(source);
+        wide[radius + width..].fill(source[width - 1]);
+        for (k, w) in along_x.iter().enumerate() {
+            for (out, value) in target.iter_mut().zip(&wide[k..]) {
+                *out += w * value;
+            }
         }
     }
     let mut result = vec![0.0; plane.len()];

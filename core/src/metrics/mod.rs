@@ -73,6 +73,13 @@ impl Errors {
     }
 }
 
+/// Returns the root mean square difference of displayed colors alone; nothing where a picture has none.
+#[must_use]
+pub fn color_rmse(picture: &Framebuffer, reference: &Framebuffer) -> Option<f64> {
+    let both = picture.channels().has(Channel::Color) && reference.channels().has(Channel::Color);
+    both.then(|| color::differences(&display_colors(picture), &display_colors(reference)).0)
+}
+
 /// Encodes the color plane as it is displayed.
 #[must_use]
 pub fn display_colors(picture: &Framebuffer) -> Vec<[f32; 3]> {

@@ -1,6 +1,7 @@
 //! What surrounds the objects: background, ambient light, fog, and the lighting model.
 
 use super::material::color_text;
+use crate::lanes::{F32x8, Vec3x8};
 use glam::{DVec3, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -96,17 +97,44 @@ impl Background {
 
     /// Returns the color in directions of that height: the y component of a direction of unit length.
     #[must_use]
-    #[inline]
     pub fn color_at(&self, height: f32) -> Vec3 {
+        self.gradient().color(height)
+    }
+
+    /// Returns the background as a gradient, which one color is, too: for many directions in a row.
+    #[must_use]
+    pub fn gradient(&self) -> Gradient {
         match *self {
-            Self::Solid(color) => color,
-            Self::Gradient { below, horizon, above } => {
-                if height >= 0.0 {
-                    horizon.lerp(above, height)
-                } else {
-                    horizon.lerp(below, -height)
-                }
-            }
+            Self::Solid(color) => Gradient { below: color, horizon: color, above: color },
+            Self::Gradient { below, horizon, above } => Gradient { below, horizon, above },
         }
+    }
+}
+
+/// Colors by the height of a direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Gradient {
+    below: Vec3,
+    horizon: Vec3,
+    above: Vec3,
+}
+
+impl Gradient {
+    /// Returns the color in directions of that height: the y component of a direction of unit length.
+    #[must_use]
+    #[inline(always)]
+    pub fn color(&self, height: f32) -> Vec3 {
+        let side = if height >= 0.0 { self.above } else { self.below };
+        self.horizon + (side - self.horizon) * height.abs()
+    }
+
+    /// Returns the colors in eight directions, to the same bytes.
+    #[must_use]
+    #[inline(always)]
+    pub fn colors(&self, height: F32x8) -> Vec3x8 {
+        let up = height.at_least(F32x8::splat(0.0));
+        let side = Vec3x8::pick(up, Vec3x8::splat(self.above), Vec3x8::splat(self.below));
+        let horizon = Vec3x8::splat(self.horizon);
+        horizon + (side - horizon).scaled(height.abs())
     }
 }

@@ -441,6 +441,12 @@ impl FreeForm {
         Ok(Self { form, bounds: bounds.intersection(cut) })
     }
 
+    /// Puts a form together with bounds that were found before, by [`FreeForm::bounds`] of the same form.
+    #[must_use]
+    pub fn from_parts(form: Form, bounds: Aabb) -> Self {
+        Self { form, bounds }
+    }
+
     /// Returns a primitive body as a free form; nothing for the plane, which encloses nothing.
     #[must_use]
     pub fn from_primitive(primitive: &Primitive) -> Option<Self> {

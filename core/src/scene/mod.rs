@@ -11,7 +11,7 @@ mod texture;
 mod volume;
 mod voxels;
 
-pub use environment::{Background, Environment, Fog, LightingModel};
+pub use environment::{Background, Environment, Fog, Gradient, LightingModel};
 pub use form::{Form, FreeForm, Perturbation, Power, Quadric};
 pub use height_field::HeightField;
 pub use light::{Arriving, Light, LightKind};

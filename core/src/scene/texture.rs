@@ -62,11 +62,28 @@ impl Texture {
                 ]
             })
             .collect();
+        Self::from_linear16(name, width, height, texels)
+    }
+
+    /// Builds a texture from [`Texture::texels`]: linear light and alpha, 65535 = 1, row 0 at the top.
+    ///
+    /// # Panics
+    /// When the number of texels does not fit the size, or the size is zero.
+    #[must_use]
+    pub fn from_linear16(name: impl Into<String>, width: u32, height: u32, texels: Vec<[u16; 4]>) -> Self {
+        assert!(width > 0 && height > 0, "a texture needs at least one texel, got {width}x{height}");
+        assert_eq!(texels.len(), width as usize * height as usize, "texels of a {width}x{height} texture");
         let mut levels = vec![Level { width, height, texels }];
         while let Some(next) = levels.last().and_then(Level::halved) {
             levels.push(next);
         }
         Self { name: name.into(), wrap: [TextureWrap::Repeat; 2], levels }
+    }
+
+    /// Returns the full picture in linear light, 65535 = 1, rows from the top.
+    #[must_use]
+    pub fn texels(&self) -> &[[u16; 4]] {
+        &self.levels[0].texels
     }
 
     /// Returns the size of the full picture.

@@ -49,7 +49,23 @@ impl Voxels {
     pub fn from_bytes(size: [u32; 3], bytes: &[u8]) -> Self {
         let [nx, ny, nz] = size.map(|s| s as usize);
         assert_eq!(bytes.len(), nx * ny * nz, "bytes of a {nx}x{ny}x{nz} grid");
-        Self::from_fn(size, |x, y, z| bytes[(z as usize * ny + y as usize) * nx + x as usize])
+        let mut grid = Self::new(size);
+        for index in 0..grid.chunks.len() {
+            let first = grid.chunk_origin(index);
+            let end: [u32; 3] = std::array::from_fn(|a| CHUNK.min(size[a] - first[a]));
+            let mut cells = vec![0u8; CHUNK_CELLS];
+            for z in 0..end[2] {
+                for y in 0..end[1] {
+                    let from = ((first[2] + z) as usize * ny + (first[1] + y) as usize) * nx;
+                    let row = &bytes[from + first[0] as usize..][..end[0] as usize];
+                    cells[cell_index(0, y, z)..][..row.len()].copy_from_slice(row);
+                }
+            }
+            if cells.iter().any(|&b| b != 0) {
+                grid.chunks[index] = Chunk::Cells(cells.into());
+            }
+        }
+        grid
     }
 
     /// Builds a grid by asking for each cell's byte.
@@ -70,6 +86,22 @@ impl Voxels {
                 if bytes.iter().all(|&b| b == 0) { Chunk::Uniform(0) } else { Chunk::Cells(bytes.into()) };
         }
         grid
+    }
+
+    /// Puts a grid together from [`Voxels::chunks`].
+    ///
+    /// # Errors
+    /// When the number of chunks, or of cells in one, does not fit.
+    pub fn from_chunks(size: [u32; 3], chunks: Vec<Chunk>) -> Result<Self, String> {
+        let chunks_per_axis = size.map(|s| s.div_ceil(CHUNK));
+        let count = chunks_per_axis.iter().map(|&c| u128::from(c)).product::<u128>();
+        if chunks.len() as u128 != count {
+            return Err(format!("{} chunks where {count} are needed", chunks.len()));
+        }
+        if chunks.iter().any(|c| matches!(c, Chunk::Cells(cells) if cells.len() != CHUNK_CELLS)) {
+            return Err(format!("a chunk without its {CHUNK_CELLS} cells"));
+        }
+        Ok(Self { size, chunks_per_axis, chunks })
     }
 
     /// Returns the number of cells along each axis.
@@ -93,12 +125,13 @@ impl Voxels {
     /// Returns the first cell of a chunk.
     #[must_use]
     pub fn chunk_origin(&self, index: usize) -> [u32; 3] {
-        let [cx, cy, _] = self.chunks_per_axis.map(|c| c as usize);
+        let (cx, cy) = (self.chunks_per_axis[0] as usize, self.chunks_per_axis[1] as usize);
         [index % cx, index / cx % cy, index / (cx * cy)].map(|c| c as u32 * CHUNK)
     }
 
     /// Returns the byte of a cell; cells outside are empty.
     #[must_use]
+    #[inline]
     pub fn get(&self, x: u32, y: u32, z: u32) -> u8 {
         if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] {
             return 0;
@@ -123,8 +156,9 @@ impl Voxels {
         Arc::make_mut(cells)[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)] = value;
     }
 
+    #[inline]
     fn chunk_index(&self, x: u32, y: u32, z: u32) -> usize {
-        let [cx, cy, _] = self.chunks_per_axis.map(|c| c as usize);
+        let (cx, cy) = (self.chunks_per_axis[0] as usize, self.chunks_per_axis[1] as usize);
         ((z / CHUNK) as usize * cy + (y / CHUNK) as usize) * cx + (x / CHUNK) as usize
     }
 

@@ -58,6 +58,12 @@ impl<'a> Control<'a> {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
+    /// Returns the flag that stops the work, to be handed on.
+    #[must_use]
+    pub fn cancel_flag(&self) -> Option<&'a AtomicBool> {
+        self.cancel
+    }
+
     /// Returns an error once the host wants to stop.
     ///
     /// # Errors

@@ -111,21 +111,22 @@ fn texture_coordinates_are_right_in_perspective() {
 
 #[test]
 fn weights_agree_with_rays_to_a_thousandth_of_a_texel() {
+    use crate::face::Face;
     use crate::lens::Lens;
     use crate::model::{Model, Source};
-    use crate::resolve::{Ask, Resolver};
     let scene = textured_floor(Texture::from_srgb8("white", 1, 1, &[255; 4]));
     let mut model = Model::default();
     assert!(model.add(&scene, 0, Source::Given(scene.objects[0].shape.clone())));
     let camera = camera([0.0, 0.05, 4.0], [0.0, 0.0, -30.0]);
     let lens = Lens::of_camera(&camera, 640, 480, 1e-6).unwrap();
-    let mut resolver = Resolver::new(&scene, &model, &lens);
+    let face = Face::new(&scene, &model, &lens, 0);
     for (x, y) in [(320.5, 260.5), (10.5, 479.5), (600.5, 241.5), (320.5, 240.5)] {
-        let ray = lens.ray(x, y);
-        let point = resolver.resolve(0, &ray, Ask::Geometry);
-        let truth = camera.eye + ray.unit * (-camera.eye.y / ray.unit.y);
+        let direction = lens.line(x, y).1;
+        let met = face.meet(&lens, x, y);
+        let truth = camera.eye + direction * (-camera.eye.y / direction.y);
         if truth.z > -80.0 && truth.x < truth.z * -0.1 - 0.1 {
-            let off = (camera.eye + point.place - truth).length();
+            assert!(met.held.is_none(), "the ray passes through the triangle");
+            let off = (camera.eye + direction * met.t - truth).length();
             assert!(off * 1024.0 < 1e-3, "{off} at {truth}");
         }
     }

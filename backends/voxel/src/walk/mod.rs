@@ -36,11 +36,16 @@ pub(crate) struct GridRay {
     flip: [i32; 3],
 }
 
+/// Share of the numbers at hand by which a place on a ray may be off, and with it the order of its planes: a few
+/// roundings of 1e-16, and some more.
+const ROUNDING: f64 = 1e-14;
+
 /// Directions below this stand still: with it the distance of a plane could overflow.
 const SLOWEST: f64 = 1e-290;
 
 impl GridRay {
     /// Makes a ray ready. Nothing for one that goes nowhere, or whose numbers are not finite.
+    #[inline(always)]
     pub(crate) fn new(origin: DVec3, direction: DVec3) -> Option<Self> {
         if !origin.is_finite() || !direction.is_finite() || direction.abs().max_element() < SLOWEST {
             return None;
@@ -67,16 +72,30 @@ impl GridRay {
     }
 
     /// Returns the distance of a plane between mirrored cells.
-    #[inline]
+    #[inline(always)]
     fn plane(&self, axis: usize, k: i32) -> f64 {
         (f64::from(k) - self.origin[axis]) * self.inverse[axis]
     }
 
+    /// Returns the distance of a plane between cells as they are, not mirrored.
+    #[inline(always)]
+    pub(crate) fn plane_of(&self, axis: usize, k: i32) -> f64 {
+        self.plane(axis, if self.flip[axis] == 0 { k } else { -k })
+    }
+
+    /// Mirrors a cell, or mirrors it back. Written out: arrays built by closures cost calls here.
+    #[inline(always)]
+    fn mirrored(&self, [x, y, z]: [i32; 3]) -> [i32; 3] {
+        [x ^ self.flip[0], y ^ self.flip[1], z ^ self.flip[2]]
+    }
+
+    #[inline(always)]
     fn stands_still(&self, axis: usize) -> bool {
         self.direction[axis] == 0.0
     }
 
     /// Returns the point at a distance.
+    #[inline(always)]
     pub(crate) fn at(&self, t: f64) -> DVec3 {
         let along = |a: usize| {
             let step = self.direction[a] * t;
@@ -86,6 +105,7 @@ impl GridRay {
     }
 
     /// Returns the axis with the longest part of the direction, the first of equals.
+    #[inline(always)]
     fn longest_axis(&self) -> usize {
         let [x, y, z] = self.direction;
         if x >= y && x >= z {
@@ -100,8 +120,16 @@ impl GridRay {
     /// Returns the cell along an axis, between two, after all planes before a moment were crossed.
     #[inline(always)]
     fn cell_at(&self, axis: usize, from: i32, to: i32, moment: Moment) -> i32 {
-        let place = self.origin[axis] + self.direction[axis] * moment.t;
+        let step = self.direction[axis] * moment.t;
+        let place = self.origin[axis] + step;
         let cell = nearest_whole(place - 0.5).clamp(from, to);
+        // Far enough from both planes rounding cannot change their order; a cell at the end of its block has only
+        // one plane that counts.
+        let within = place - f64::from(cell);
+        let slack = (self.origin[axis].abs() + step + 1.0) * ROUNDING;
+        if (within > slack || cell == from) && (within < 1.0 - slack || cell == to) {
+            return cell;
+        }
         let is_reached = cell == from || moment.is_after(self.plane(axis, cell), axis);
         let is_left = cell < to && moment.is_after(self.plane(axis, cell + 1), axis);
         if is_reached && !is_left { cell } else { self.correct(axis, cell, from, to, moment) }
@@ -171,8 +199,9 @@ pub(crate) struct Walk {
 
 impl Walk {
     /// Begins at a moment within the grid, or later where the ray enters it. Nothing where it never does.
+    #[inline(always)]
     pub(crate) fn begin(ray: GridRay, size: [i32; 3], moment: Moment) -> Option<Self> {
-        let low: [i32; 3] = std::array::from_fn(|a| size[a] & ray.flip[a]).map(|s: i32| -s);
+        let low = [-(size[0] & ray.flip[0]), -(size[1] & ray.flip[1]), -(size[2] & ray.flip[2])];
         let (mut start, mut entered) = (moment, None);
         for (a, &low) in low.iter().enumerate() {
             if ray.stands_still(a) {
@@ -202,20 +231,22 @@ impl Walk {
 
     /// Begins at the origin of the ray in a cell that is known. Nothing where it lies outside of the grid; a ray
     /// that left the grid and goes away from it never returns.
+    #[inline(always)]
     pub(crate) fn begin_in(ray: GridRay, size: [i32; 3], cell: [i32; 3]) -> Option<Self> {
-        let cell = std::array::from_fn(|a| cell[a] ^ ray.flip[a]);
+        let cell = ray.mirrored(cell);
         let walk = Self { ray, size, cell, t: 0.0, entered: None, steps: 0 };
         walk.is_inside().then_some(walk)
     }
 
     /// Returns the cell.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn cell(&self) -> [i32; 3] {
-        std::array::from_fn(|a| self.cell[a] ^ self.ray.flip[a])
+        self.ray.mirrored(self.cell)
     }
 
     /// Counts the planes between the cell and the corner at which a ray of this direction enters: rises by one
     /// with each single step, and is the same wherever the walk began.
+    #[inline(always)]
     pub(crate) fn rank(&self) -> i64 {
         let low = |a: usize| i64::from(-(self.size[a] & self.ray.flip[a]));
         (0..3).map(|a| i64::from(self.cell[a]) - low(a)).sum()
@@ -254,7 +285,7 @@ impl Walk {
         self.entered = Some(AXIS);
     }
 
-    #[inline]
+    #[inline(always)]
     fn is_inside(&self) -> bool {
         let cell = self.cell();
         (cell[0] as u32) < self.size[0] as u32
@@ -264,7 +295,7 @@ impl Walk {
 
     /// Goes on to the first marked cell, this one included, that is entered before a distance. Tells whether
     /// there is one, and whether empty cells were passed on the way.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn find_marked(&mut self, layer: &Layer, before: f64) -> Found {
         let mut passed_empty = false;
         loop {
@@ -280,12 +311,14 @@ impl Walk {
 
     /// Returns the face entered: twice the axis, plus one when it is the upper face of the cell. A walk that
     /// began in the cell is taken to have entered against the longest part of its direction.
+    #[inline(always)]
     pub(crate) fn face(&self) -> usize {
         let axis = self.entered.unwrap_or(self.ray.longest_axis());
         axis * 2 + usize::from(self.ray.flip[axis] != 0)
     }
 
     /// Returns the point at which the cell was entered: within the cell, and exactly in the face.
+    #[inline(always)]
     pub(crate) fn point(&self) -> DVec3 {
         let cell = DVec3::from_array(self.cell().map(f64::from));
         let mut point = self.ray.at(self.t).clamp(cell, cell + 1.0);
@@ -296,12 +329,13 @@ impl Walk {
     }
 
     /// Returns the cell from which this one was entered: across the face, or the same where the walk began.
+    #[inline(always)]
     pub(crate) fn cell_before(&self) -> [i32; 3] {
         let mut cell = self.cell;
         if let Some(a) = self.entered {
             cell[a] -= 1;
         }
-        std::array::from_fn(|a| cell[a] ^ self.ray.flip[a])
+        self.ray.mirrored(cell)
     }
 }
 

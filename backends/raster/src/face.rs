@@ -1,0 +1,283 @@
+//! Where does the ray of a pixel meet a triangle, and what does its surface look like there?
+//!
+//! Visibility only names the triangle. Distance and attributes come from meeting the ray of the pixel's center
+//! with the triangle's own plane in double precision, so they owe nothing to snapped corners or stored depths.
+//! Along the rays of a picture every linear function of a point is affine in column and row; a triangle is set
+//! up once for all pixels of a tile that show it.
+
+use crate::lens::{Lens, OnRays};
+use crate::model::{Model, Part};
+use crate::tile::NO_TRIANGLE;
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use polyptych_core::scene::{Mapping, Material, Mesh, Scene, Texture};
+
+/// Weights of corners that a snapped corner may cause outside of the triangle are extrapolated up to here;
+/// beyond (narrow slivers) the nearest point of the triangle is taken.
+const OUTSIDE: f64 = -1.0 / 64.0;
+
+/// A triangle set up to be met by the rays of a lens, relative to the lens's origin.
+pub(crate) struct Face {
+    /// Along the normal; the plane is where it reaches `height`.
+    across: OnRays,
+    height: f64,
+    /// The weights of the second and third corner, less by their offsets.
+    weights: [OnRays; 2],
+    offsets: [f64; 2],
+    /// The normal as a unit vector, on the side that its author calls outside.
+    pub(crate) outward: DVec3,
+    /// The shading normal of the first corner, and how those of the others differ; not of unit length.
+    normals: [Vec3; 3],
+    origin: DVec3,
+    edges: [DVec3; 2],
+    pub(crate) id: u32,
+    /// Index of its part, and the triangle's in it.
+    pub(crate) part: u32,
+    triangle: u32,
+    is_mirrored: bool,
+    /// Whether color or opacity change over the triangle.
+    pub(crate) is_painted: bool,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy)]
+pub(crate) struct Met {
+    /// Along the ray, in lengths of its direction.
+    pub(crate) t: f64,
+    weights: [f64; 3],
+    /// Whether the ray comes from the side that is not outside.
+    pub(crate) from_within: bool,
+    /// The nearest point of the triangle, where the ray passes beside it.
+    pub(crate) held: Option<DVec3>,
+}
+
+/// A place of the picture of a scene.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) model: &'a Model,
+    pub(crate) lens: &'a Lens,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+}
+
+impl Face {
+    pub(crate) fn new(scene: &Scene, model: &Model, lens: &Lens, id: u32) -> Self {
+        let (index, triangle) = model.find(id);
+        let part = &model.parts[index];
+        let [a, b, c] = part.corners(triangle, lens.origin);
+        let edges = [b - a, c - a];
+        let normal = edges[0].cross(edges[1]);
+        let share = 1.0 / normal.length_squared();
+        let slopes = [edges[1].cross(normal) * share, normal.cross(edges[0]) * share];
+        let mesh = part.mesh();
+        let corners = mesh.triangles[triangle];
+        let material = scene.material(&scene.objects[part.object], mesh.slot(triangle));
+        let is_painted = material.texture.is_some() || !mesh.colors.is_empty();
+        let turned = if part.mirrored { -normal } else { normal };
+        let outward = turned.normalize_or_zero();
+        Self {
+            across: lens.on_rays(normal),
+            height: a.dot(normal),
+            weights: [lens.on_rays(slopes[0]), lens.on_rays(slopes[1])],
+            offsets: [a.dot(slopes[0]), a.dot(slopes[1])],
+            outward,
+            normals: shading_normals(part, mesh, corners, outward),
+            origin: a,
+            edges,
+            id,
+            part: index as u32,
+            triangle: triangle as u32,
+            is_mirrored: part.mirrored,
+            is_painted,
+        }
+    }
+
+    /// Meets the ray through a place of the picture.
+    #[inline(always)]
+    pub(crate) fn meet(&self, lens: &Lens, x: f64, y: f64) -> Met {
+        let (start, slope) = self.across.at(lens.rays, x, y);
+        let t = (self.height - start) / slope;
+        let weight = |i: usize| {
+            let (start, slope) = self.weights[i].at(lens.rays, x, y);
+            (start - self.offsets[i]) + slope * t
+        };
+        let (v, w) = (weight(0), weight(1));
+        let weights = [1.0 - v - w, v, w];
+        let from_within = (slope > 0.0) != self.is_mirrored && slope != 0.0;
+        let met = Met { t, weights, from_within, held: None };
+        let lowest = weights[0].min(v).min(w);
+        if lowest >= 0.0 { met } else { self.hold(&met, lowest, lens, x, y) }
+    }
+
+    /// Keeps to the triangle where snapped corners made a pixel show it that its ray passes beside.
+    #[inline(never)]
+    fn hold(&self, met: &Met, lowest: f64, lens: &Lens, x: f64, y: f64) -> Met {
+        let held = nearest(met.weights);
+        let inside = self.origin + self.edges[0] * held[1] + self.edges[1] * held[2];
+        if lowest >= OUTSIDE {
+            return Met { held: Some(inside), ..*met };
+        }
+        let (start, direction) = lens.line(x, y);
+        let t = (inside - start).dot(direction) / direction.length_squared();
+        Met { t, weights: held, held: Some(inside), ..*met }
+    }
+
+    /// Returns the interpolated shading normal, not of unit length, on the outside.
+    #[inline(always)]
+    pub(crate) fn normal(&self, met: &Met) -> Vec3 {
+        self.normals[0] + self.normals[1] * met.weights[1] as f32 + self.normals[2] * met.weights[2] as f32
+    }
+
+    /// Returns the material.
+    #[inline]
+    pub(crate) fn material<'a>(&self, scene: &'a Scene, model: &Model) -> &'a Material {
+        let part = &model.parts[self.part as usize];
+        scene.material(&scene.objects[part.object], part.mesh().slot(self.triangle as usize))
+    }
+
+    /// Returns base color and effective opacity where a ray met it.
+    #[inline(always)]
+    pub(crate) fn color(&self, at: &Place<'_>, met: &Met) -> (Vec3, f32) {
+        let material = self.material(at.scene, at.model);
+        if self.is_painted {
+            self.painted(at, material, met)
+        } else {
+            (material.base_color, material.effective_opacity(material.opacity).min(1.0))
+        }
+    }
+
+    #[inline(never)]
+    fn painted(&self, at: &Place<'_>, material: &Material, met: &Met) -> (Vec3, f32) {
+        let part = &at.model.parts[self.part as usize];
+        let mesh = part.mesh();
+        let [a, b, c] = mesh.triangles[self.triangle as usize].map(|i| i as usize);
+        let weights = met.weights;
+        let texture = material.texture.and_then(|t| at.scene.textures.get(t));
+        let (base, opacity) = match texture {
+            None => (material.base_color, material.opacity),
+            Some(texture) => {
+                let uv = (!mesh.uvs.is_empty()).then(|| {
+                    let [u, v, w] = [a, b, c].map(|i| mesh.uvs[i].as_dvec2());
+                    (u * weights[0] + v * weights[1] + w * weights[2]).as_vec2()
+                });
+                let [p, q, r] = [a, b, c].map(|i| mesh.positions[i].as_dvec3());
+                let position = (p * weights[0] + q * weights[1] + r * weights[2]).as_vec3();
+                let normal = (q - p).cross(r - p).normalize_or_zero().as_vec3();
+                let lod = self.lod(at, part, material, texture, met);
+                at.scene.base_color(material, uv.map(|v| v.to_array()), position, normal, lod)
+            }
+        };
+        let tint = if mesh.colors.is_empty() {
+            Vec3::ONE
+        } else {
+            let w = weights.map(|w| w as f32);
+            mesh.colors[a] * w[0] + mesh.colors[b] * w[1] + mesh.colors[c] * w[2]
+        };
+        (base * tint, material.effective_opacity(opacity).min(1.0))
+    }
+
+    /// Returns the mip level at which a texel is as large as the pixel, from the exact change of the point over
+    /// one pixel to the right and one down.
+    fn lod(&self, at: &Place<'_>, part: &Part, material: &Material, texture: &Texture, met: &Met) -> f32 {
+        let mesh = part.mesh();
+        let (right, down) = at.lens.change(met.t);
+        let direction = at.lens.line(at.x, at.y).1;
+        let normal = self.edges[0].cross(self.edges[1]);
+        let share = 1.0 / normal.dot(direction);
+        let moved = [right, down].map(|d| d - direction * (normal.dot(d) * share));
+        let scale = match material.mapping {
+            Mapping::Uv if !mesh.uvs.is_empty() => {
+                let corners = mesh.triangles[self.triangle as usize];
+                let [a, b, c] = corners.map(|i| mesh.uvs[i as usize].as_dvec2());
+                let across = 1.0 / normal.length_squared();
+                let slopes = [self.edges[1].cross(normal) * across, normal.cross(self.edges[0]) * across];
+                let [x, y] =
+                    moved.map(|d| -> DVec2 { (b - a) * d.dot(slopes[0]) + (c - a) * d.dot(slopes[1]) });
+                return texture.lod(x.as_vec2(), y.as_vec2());
+            }
+            Mapping::Uv => 1.0,
+            Mapping::Triplanar { scale } => scale,
+        };
+        // In object space lengths are those before the part's transform.
+        let back = part.object_from_vector;
+        let [x, y] = moved.map(|d| Vec2::new((back * d).length() as f32 * scale, 0.0));
+        texture.lod(x, y)
+    }
+}
+
+impl Place<'_> {
+    /// Tells whether a triangle is no hole at a place of the picture.
+    pub(crate) fn is_solid(&self, face: &Face) -> bool {
+        face.color(self, &face.meet(self.lens, self.x, self.y)).1 > 0.0
+    }
+}
+
+/// Returns the first corner's normal in the world and how the others differ; the true one where there are none.
+fn shading_normals(part: &Part, mesh: &Mesh, corners: [u32; 3], outward: DVec3) -> [Vec3; 3] {
+    if mesh.normals.is_empty() {
+        return [outward.as_vec3(), Vec3::ZERO, Vec3::ZERO];
+    }
+    let turned = |i: u32| part.world_from_normal * mesh.normals[i as usize];
+    let [a, b, c] = [turned(corners[0]), turned(corners[1]), turned(corners[2])];
+    [a, b - a, c - a]
+}
+
+/// Moves weights to the nearest that are not negative; equal ones where they are not finite.
+fn nearest(weights: [f64; 3]) -> [f64; 3] {
+    let held = weights.map(|w| w.max(0.0));
+    let sum = held[0] + held[1] + held[2];
+    if sum.is_finite() && sum > 0.0 { held.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
+}
+
+/// The triangles that a tile shows, each set up once.
+pub(crate) struct Faces {
+    pub(crate) faces: Vec<Face>,
+    /// A hash table of their ids and indices.
+    ids: Box<[u32; SLOTS]>,
+    indices: Box<[u16; SLOTS]>,
+}
+
+const SLOTS: usize = 4096;
+/// Most triangles at once: the table stays a quarter empty.
+const MOST_FACES: usize = SLOTS / 4 * 3;
+
+impl Default for Faces {
+    fn default() -> Self {
+        Self { faces: Vec::new(), ids: Box::new([NO_TRIANGLE; SLOTS]), indices: Box::new([0; SLOTS]) }
+    }
+}
+
+impl Faces {
+    /// Forgets all triangles.
+    pub(crate) fn clear(&mut self) {
+        if !self.faces.is_empty() {
+            self.faces.clear();
+            self.ids.fill(NO_TRIANGLE);
+        }
+    }
+
+    pub(crate) fn is_full(&self) -> bool {
+        self.faces.len() >= MOST_FACES
+    }
+
+    /// Returns the index of a triangle, set up where it was not yet.
+    #[inline]
+    pub(crate) fn find(&mut self, scene: &Scene, model: &Model, lens: &Lens, id: u32) -> u16 {
+        // Neighbors have ids close together: spread them by Knuth's multiplicative hash.
+        let mut slot = (id.wrapping_mul(2_654_435_769) >> 20) as usize;
+        while self.ids[slot] != id {
+            if self.ids[slot] == NO_TRIANGLE {
+                self.ids[slot] = id;
+                self.indices[slot] = self.faces.len() as u16;
+                self.faces.push(Face::new(scene, model, lens, id));
+                break;
+            }
+            slot = (slot + 1) % SLOTS;
+        }
+        self.indices[slot]
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.faces.capacity() * size_of::<Face>() + SLOTS * 6
+    }
+}

@@ -1,0 +1,211 @@
+//! A picture, tile by tile: what can the rays of a tile meet, what do they meet, and what color is it?
+
+use crate::beam::Bundle;
+use crate::trace::{Shadows, Tracer, Wants, finite};
+use crate::world::Reach;
+use glam::{DVec3, Vec3};
+use polyptych_core::camera::{Camera, Projection, View};
+use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
+use polyptych_core::math::{Aabb, Ray};
+use polyptych_core::seam::Control;
+
+/// Edge of a tile in pixels, and rows of a band: rays of a tile meet the same chunks.
+pub(crate) const TILE: u32 = 16;
+const TILE_RAYS: usize = (TILE * TILE) as usize;
+/// Lamps whose shadow rays are bounded together, the first of a scene.
+const BOUNDED_LAMPS: usize = 4;
+
+/// Draws bands of a picture.
+pub(crate) struct Painter<'a> {
+    view: View<'a>,
+    /// Whether the rays of a tile lie between those of its corners.
+    is_straight: bool,
+    wants: Wants,
+}
+
+/// Pixels of a band that are drawn together.
+#[derive(Clone, Copy)]
+struct Tile {
+    first_column: u32,
+    columns: u32,
+    first_row: u32,
+    rows: u32,
+}
+
+impl Tile {
+    /// Lists the pixels by rows: index in the tile, column in the picture, row in the band.
+    fn pixels(self) -> impl Iterator<Item = (usize, u32, u32)> {
+        (0..self.rows).flat_map(move |row| {
+            (0..self.columns).map(move |x| ((row * TILE + x) as usize, self.first_column + x, row))
+        })
+    }
+}
+
+/// Returns what must be found out for some channels; what is not asked for is not computed.
+fn wants(channels: Channels) -> Wants {
+    Wants { color: channels.has(Channel::Color), shadow: channels.has(Channel::Shadow) }
+}
+
+impl<'a> Painter<'a> {
+    pub(crate) fn new(camera: &'a Camera, target: &Framebuffer) -> Self {
+        Self {
+            view: camera.view(target.width(), target.height()),
+            is_straight: matches!(
+                camera.projection,
+                Projection::Perspective { .. } | Projection::Orthographic { .. }
+            ),
+            wants: wants(target.channels()),
+        }
+    }
+
+    /// Draws a band tile by tile; false where the host stopped it.
+    pub(crate) fn paint(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("bmi2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for processor features can only be called so"
+            )]
+            // SAFETY: the processor has the features that the kernel was compiled for; it was just asked.
+            return unsafe { self.paint_avx2(tracer, band, control) };
+        }
+        self.paint_tiles(tracer, band, control)
+    }
+
+    /// The same code with newer instructions: none of them rounds in another way.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn paint_avx2(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
+        self.paint_tiles(tracer, band, control)
+    }
+
+    #[inline(always)]
+    fn paint_tiles(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
+        for first_column in (0..band.width).step_by(TILE as usize) {
+            if control.is_cancelled() {
+                return false;
+            }
+            let columns = TILE.min(band.width - first_column);
+            let tile = Tile { first_column, columns, first_row: band.first_row, rows: band.rows };
+            match self.reach(tracer, tile) {
+                Some(reach) if reach.is_empty() => self.empty_tile(tracer, band, tile),
+                Some(reach) => self.tile(tracer, band, tile, &reach),
+                None => self.wide_tile(tracer, band, tile),
+            }
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn ray(&self, tile: Tile, x: u32, row: u32) -> Option<Ray> {
+        self.view.ray(f64::from(x) + 0.5, f64::from(tile.first_row + row) + 0.5)
+    }
+
+    /// Finds what the rays of a tile may meet.
+    fn reach(&self, tracer: &Tracer<'_>, tile: Tile) -> Option<Reach> {
+        let mut origins = Aabb::EMPTY;
+        let mut directions = [DVec3::ZERO; TILE_RAYS];
+        let mut count = 0;
+        let mut add = |ray: Ray| {
+            origins = origins.with(ray.origin);
+            directions[count] = ray.direction;
+            count += 1;
+        };
+        if self.is_straight {
+            for row in [0, tile.rows - 1] {
+                for x in [0, tile.columns - 1] {
+                    add(self.ray(tile, tile.first_column + x, row)?);
+                }
+            }
+        } else {
+            tile.pixels().filter_map(|(_, x, row)| self.ray(tile, x, row)).for_each(&mut add);
+        }
+        let bundle = Bundle { origins, directions: &directions[..count] };
+        tracer.world.reach(&bundle, |grid| &grid.seen)
+    }
+
+    /// Draws a tile that sees nothing but background.
+    #[inline(always)]
+    fn empty_tile(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
+        let background = &tracer.world.scene.environment.background;
+        let nothing = Pixel::background(Vec3::ZERO);
+        for row in 0..tile.rows {
+            let first = (row * band.width + tile.first_column) as usize;
+            let pixels = first..first + tile.columns as usize;
+            if self.wants.color {
+                for (x, color) in (tile.first_column..).zip(&mut band.color[pixels.clone()]) {
+                    // Adding to zero drops the sign of -0, as adding up layers does.
+                    *color = self.ray(tile, x, row).map_or(Vec3::ZERO, |ray| {
+                        finite(Vec3::ZERO + background.color_at(ray.direction.y as f32))
+                    });
+                }
+            }
+            fill(band.distance, pixels.clone(), nothing.distance);
+            fill(band.normal, pixels.clone(), nothing.normal);
+            fill(band.id, pixels.clone(), nothing.id);
+            fill(band.albedo, pixels.clone(), nothing.albedo);
+            fill(band.shadow, pixels.clone(), nothing.shadow);
+            fill(band.coverage, pixels, nothing.coverage);
+        }
+        let rays = u64::from(tile.rows) * u64::from(tile.columns);
+        tracer.counts.rays.set(tracer.counts.rays.get() + rays);
+    }
+
+    /// Draws a tile whose rays may meet a few grids in known places.
+    #[inline(always)]
+    fn tile(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile, reach: &Reach) {
+        let mut rays = [None; TILE_RAYS];
+        let mut met = [None; TILE_RAYS];
+        let mut sites = Aabb::EMPTY;
+        for (i, x, row) in tile.pixels() {
+            let Some(ray) = self.ray(tile, x, row) else { continue };
+            rays[i] = Some(ray);
+            met[i] = tracer.world.meet_within(&ray, reach, &tracer.counts);
+            if let Some(met) = &met[i] {
+                sites = tracer.world.with_site(sites, &ray, met);
+            }
+        }
+        let lights = self.lights(tracer, sites);
+        let (mut seen, nothing) = (0, Pixel::background(Vec3::ZERO));
+        for (i, x, row) in tile.pixels() {
+            let pixel = rays[i].map_or(nothing, |ray| {
+                seen += 1;
+                tracer.color(&ray, met[i], &lights, self.wants)
+            });
+            band.put(x, row, &pixel);
+        }
+        tracer.counts.rays.set(tracer.counts.rays.get() + seen);
+    }
+
+    /// Finds what shadow rays from a part of space to parallel lights may meet.
+    fn lights(&self, tracer: &Tracer<'_>, sites: Aabb) -> [Option<Reach>; BOUNDED_LAMPS] {
+        let is_lit = self.wants.color || self.wants.shadow;
+        let mut lights = [None; BOUNDED_LAMPS];
+        if sites.is_empty() || !is_lit || tracer.shadows == Shadows::Off {
+            return lights;
+        }
+        for (light, lamp) in lights.iter_mut().zip(&tracer.world.lamps) {
+            let Some(direction) = lamp.direction().filter(|_| lamp.casts_shadow) else { continue };
+            let bundle = Bundle { origins: sites, directions: &[direction] };
+            *light = tracer.world.reach(&bundle, |grid| &grid.blocking);
+        }
+        lights
+    }
+
+    /// Draws a tile whose rays go too far apart to be bounded together, or that sees many grids.
+    fn wide_tile(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
+        for (_, x, row) in tile.pixels() {
+            // Outside of a fisheye's circle there is nothing to see, not even a background.
+            let nothing = Pixel::background(Vec3::ZERO);
+            let pixel = self.ray(tile, x, row).map_or(nothing, |ray| tracer.look(&ray, self.wants));
+            band.put(x, row, &pixel);
+        }
+    }
+}
+
+/// Fills pixels of a plane, if the picture has it.
+fn fill<T: Copy>(plane: &mut [T], pixels: std::ops::Range<usize>, value: T) {
+    if !plane.is_empty() {
+        plane[pixels].fill(value);
+    }
+}

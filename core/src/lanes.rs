@@ -1,0 +1,404 @@
+//! How are eight numbers reckoned at once? As plain arrays: the compiler turns each operation into the widest
+//! registers that a kernel may use, and into the same bytes whatever their width.
+//!
+//! A kernel is written once over these types, compiled for the plain processor and for its extensions
+//! (`#[target_feature(enable = "avx2")]`), and chosen at run time. Fixed arrays alone would not do: the compiler
+//! unrolls a long loop body over eight numbers before it looks for vectors in it.
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// Makes eight of something, lane by lane. A plain loop: closures may stay calls in builds that do not optimize
+/// across them.
+macro_rules! lanes {
+    ($zero:expr, $i:ident => $value:expr) => {{
+        let mut all = [$zero; LANES];
+        for $i in 0..LANES {
+            all[$i] = $value;
+        }
+        all
+    }};
+}
+
+/// How many numbers there are at once.
+pub const LANES: usize = 8;
+
+/// Eight numbers in single precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct F32x8(pub [f32; LANES]);
+
+/// Eight numbers in double precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct F64x8(pub [f64; LANES]);
+
+/// Eight whole numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct I32x8(pub [i32; LANES]);
+
+/// Eight truth values: all bits set, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mask8(pub [u32; LANES]);
+
+/// Eight vectors, or colors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(missing_docs, reason = "the axes")]
+pub struct Vec3x8 {
+    pub x: F32x8,
+    pub y: F32x8,
+    pub z: F32x8,
+}
+
+/// Eight vectors in double precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(missing_docs, reason = "the axes")]
+pub struct DVec3x8 {
+    pub x: F64x8,
+    pub y: F64x8,
+    pub z: F64x8,
+}
+
+macro_rules! numbers {
+    ($lanes:ident, $number:ty: $($trait:ident $method:ident $op:tt),*) => {
+        impl $lanes {
+            /// Repeats a number.
+            #[must_use]
+            #[inline(always)]
+            pub fn splat(value: $number) -> Self {
+                Self([value; LANES])
+            }
+
+            /// Reads the first eight numbers of a slice.
+            ///
+            /// # Panics
+            /// When there are less.
+            #[must_use]
+            #[inline(always)]
+            pub fn load(from: &[$number]) -> Self {
+                let from: &[$number; LANES] = from[..LANES].try_into().expect("a slice of eight");
+                Self(*from)
+            }
+
+            /// Writes them over the first eight numbers of a slice.
+            ///
+            /// # Panics
+            /// When there are less.
+            #[inline(always)]
+            pub fn store(self, to: &mut [$number]) {
+                to[..LANES].copy_from_slice(&self.0);
+            }
+        }
+        $(impl $trait for $lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(lanes!(0 as $number, i => self.0[i] $op other.0[i]))
+            }
+        })*
+    };
+}
+numbers!(F32x8, f32: Add add +, Sub sub -, Mul mul *, Div div /);
+numbers!(F64x8, f64: Add add +, Sub sub -, Mul mul *, Div div /);
+numbers!(I32x8, i32: Add add +, Sub sub -, Mul mul *, BitOr bitor |, BitAnd bitand &);
+
+impl F32x8 {
+    /// Returns the smaller ones; the other where one is not a number.
+    #[must_use]
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self(lanes!(0.0, i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+
+    /// Returns the larger ones; the other where one is not a number.
+    #[must_use]
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self(lanes!(0.0, i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+
+    /// Returns the square roots.
+    #[must_use]
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        Self(lanes!(0.0, i => self.0[i].sqrt()))
+    }
+
+    /// Returns them without sign.
+    #[must_use]
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self(lanes!(0.0, i => self.0[i].abs()))
+    }
+
+    /// Tells which are greater.
+    #[must_use]
+    #[inline(always)]
+    pub fn above(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] > other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Tells which are greater or equal.
+    #[must_use]
+    #[inline(always)]
+    pub fn at_least(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] >= other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Tells which are equal.
+    #[must_use]
+    #[inline(always)]
+    pub fn equal(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] == other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Puts zero in place of what is not finite.
+    #[must_use]
+    #[inline(always)]
+    pub fn finite(self) -> Self {
+        Self::splat(f32::INFINITY).above(self.abs()).pick(self, Self::splat(0.0))
+    }
+}
+
+impl Neg for F32x8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(lanes!(0.0, i => -self.0[i]))
+    }
+}
+
+impl F64x8 {
+    /// Returns the square roots.
+    #[must_use]
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        Self(lanes!(0.0, i => self.0[i].sqrt()))
+    }
+
+    /// Rounds to single precision.
+    #[must_use]
+    #[inline(always)]
+    pub fn round(self) -> F32x8 {
+        F32x8(lanes!(0.0, i => self.0[i] as f32))
+    }
+}
+
+impl I32x8 {
+    /// Counts from a number up.
+    #[must_use]
+    #[inline(always)]
+    pub fn count_from(first: i32) -> Self {
+        Self::splat(first) + Self([0, 1, 2, 3, 4, 5, 6, 7])
+    }
+
+    /// Tells which are not negative.
+    #[must_use]
+    #[inline(always)]
+    pub fn not_negative(self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] >= 0 { u32::MAX } else { 0 }))
+    }
+
+    /// Turns them into numbers in double precision.
+    #[must_use]
+    #[inline(always)]
+    pub fn to_f64(self) -> F64x8 {
+        F64x8(lanes!(0.0, i => f64::from(self.0[i])))
+    }
+}
+
+impl Mask8 {
+    /// None.
+    pub const NONE: Self = Self([0; LANES]);
+
+    /// Reads eight words as they are.
+    ///
+    /// # Panics
+    /// When there are less.
+    #[must_use]
+    #[inline(always)]
+    pub fn load(from: &[u32]) -> Self {
+        let from: &[u32; LANES] = from[..LANES].try_into().expect("a slice of eight");
+        Self(*from)
+    }
+
+    /// Tells which words are greater than one.
+    #[must_use]
+    #[inline(always)]
+    pub fn above(self, word: u32) -> Self {
+        Self(lanes!(0_u32, i => if self.0[i] > word { u32::MAX } else { 0 }))
+    }
+
+    /// Tells whether there is one.
+    #[must_use]
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        let [a, b, c, d, e, f, g, h] = self.0;
+        a | b | c | d | e | f | g | h != 0
+    }
+
+    /// Tells whether one of them is set.
+    #[must_use]
+    #[inline(always)]
+    pub fn has(self, lane: usize) -> bool {
+        self.0[lane] != 0
+    }
+
+    /// Takes `yes` where it is set, else `no`.
+    #[must_use]
+    #[inline(always)]
+    pub fn pick(self, yes: F32x8, no: F32x8) -> F32x8 {
+        let yes = Self(lanes!(0_u32, i => yes.0[i].to_bits()));
+        let no = Self(lanes!(0_u32, i => no.0[i].to_bits()));
+        let bits = self.pick_bits(yes, no);
+        F32x8(lanes!(0.0, i => f32::from_bits(bits.0[i])))
+    }
+
+    /// Takes the bits of `yes` where it is set, else those of `no`.
+    #[must_use]
+    #[inline(always)]
+    pub fn pick_bits(self, yes: Self, no: Self) -> Self {
+        Self(lanes!(0_u32, i => (yes.0[i] & self.0[i]) | (no.0[i] & !self.0[i])))
+    }
+}
+
+impl BitAnd for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(lanes!(0_u32, i => self.0[i] & other.0[i]))
+    }
+}
+
+impl BitOr for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(lanes!(0_u32, i => self.0[i] | other.0[i]))
+    }
+}
+
+impl Not for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(lanes!(0_u32, i => !self.0[i]))
+    }
+}
+
+macro_rules! vectors {
+    ($vectors:ident, $lanes:ident, $one:ty) => {
+        impl $vectors {
+            /// Repeats a vector.
+            #[must_use]
+            #[inline(always)]
+            pub fn splat(v: $one) -> Self {
+                Self { x: $lanes::splat(v.x), y: $lanes::splat(v.y), z: $lanes::splat(v.z) }
+            }
+
+            /// Returns one of them.
+            #[must_use]
+            #[inline(always)]
+            pub fn get(&self, lane: usize) -> $one {
+                <$one>::new(self.x.0[lane], self.y.0[lane], self.z.0[lane])
+            }
+
+            /// Sets one of them.
+            #[inline(always)]
+            pub fn set(&mut self, lane: usize, v: $one) {
+                (self.x.0[lane], self.y.0[lane], self.z.0[lane]) = (v.x, v.y, v.z);
+            }
+
+            /// Returns the inner products.
+            #[must_use]
+            #[inline(always)]
+            pub fn dot(self, other: Self) -> $lanes {
+                self.x * other.x + self.y * other.y + self.z * other.z
+            }
+
+            /// Returns the lengths.
+            #[must_use]
+            #[inline(always)]
+            pub fn length(self) -> $lanes {
+                self.dot(self).sqrt()
+            }
+
+            /// Multiplies each by its number.
+            #[must_use]
+            #[inline(always)]
+            pub fn scaled(self, by: $lanes) -> Self {
+                Self { x: self.x * by, y: self.y * by, z: self.z * by }
+            }
+        }
+
+        impl Add for $vectors {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
+            }
+        }
+
+        impl Sub for $vectors {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
+            }
+        }
+
+        impl Mul for $vectors {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                Self { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
+            }
+        }
+    };
+}
+vectors!(Vec3x8, F32x8, glam::Vec3);
+vectors!(DVec3x8, F64x8, glam::DVec3);
+
+impl Vec3x8 {
+    /// Takes `yes` where the mask is set, else `no`.
+    #[must_use]
+    #[inline(always)]
+    pub fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
+        Self { x: mask.pick(yes.x, no.x), y: mask.pick(yes.y, no.y), z: mask.pick(yes.z, no.z) }
+    }
+
+    /// Puts zero in place of components that are not finite.
+    #[must_use]
+    #[inline(always)]
+    pub fn finite(self) -> Self {
+        Self { x: self.x.finite(), y: self.y.finite(), z: self.z.finite() }
+    }
+}
+
+impl DVec3x8 {
+    /// Rounds to single precision.
+    #[must_use]
+    #[inline(always)]
+    pub fn round(self) -> Vec3x8 {
+        Vec3x8 { x: self.x.round(), y: self.y.round(), z: self.z.round() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_are_reckoned_apart() {
+        let a = F32x8([1.0, -2.0, 3.5, 0.0, f32::NAN, 1e30, -0.0, 8.0]);
+        let b = F32x8::splat(2.0);
+        assert_eq!((a * b + b).0[..4], [4.0, -2.0, 9.0, 2.0]);
+        assert_eq!(a.above(b).0, [0, 0, u32::MAX, 0, 0, u32::MAX, 0, u32::MAX]);
+        assert_eq!(a.above(b).pick(a, b).0, [2.0, 2.0, 3.5, 2.0, 2.0, 1e30, 2.0, 8.0]);
+        assert_eq!(a.finite().0[4], 0.0);
+        assert_eq!(a.finite().0[5], 1e30);
+        assert!(a.above(b).any() && !(a.above(b) & Mask8::NONE).any());
+        let count = I32x8::count_from(-3);
+        assert_eq!(count.not_negative().0, [0, 0, 0, u32::MAX, u32::MAX, u32::MAX, u32::MAX, u32::MAX]);
+        assert_eq!(count.to_f64().round().0[7], 4.0);
+        let v = Vec3x8::splat(glam::Vec3::new(2.0, 3.0, 6.0));
+        assert_eq!(v.length(), F32x8::splat(7.0));
+    }
+}

@@ -1,0 +1,114 @@
+//! Does `polyptych validate` pass what is right, and name what is wrong?
+
+#![cfg(target_os = "linux")]
+
+#[path = "common/plugins.rs"]
+mod libraries;
+
+use libraries::{built, compiled, folder};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+/// Runs checks against a plugin; returns the exit code and what was printed.
+fn validate(library: &Path, words: &[&str]) -> (Option<i32>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_polyptych"));
+    command.arg("validate").arg(library).args(words);
+    let done = command.output().expect("the command starts");
+    let text = [done.stdout, done.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    (done.status.code(), text)
+}
+
+#[test]
+fn the_template_keeps_every_promise_and_the_report_says_so() {
+    let out = folder("validate-template");
+    let (code, text) = validate(&built("polyptych_template"), &["-o", out.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("template: 17 of 17 promises are kept"), "{text}");
+    let report: Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+    assert_eq!(
+        (&report["passed"], report["checks"].as_array().map(Vec::len)),
+        (&Value::Bool(true), Some(17))
+    );
+    assert!(std::fs::read_to_string(out.join("report.html")).unwrap().contains("17 of 17 promises are kept"));
+}
+
+/// Checks that neither measure the machine nor convert the whole default scene.
+const QUICK: &str =
+    "after-a-switch,sizes,every-pixel,required,empty-scene,cancelling,edits,parameters,wild-numbers";
+
+#[test]
+fn the_example_in_c_keeps_every_promise() {
+    let library = folder("validate-facets").join("libfacets.so");
+    let Some(()) = compiled("plugins/examples/facets/facets.c", &library, &["-std=c99"]) else { return };
+    let (code, text) = validate(&library, &["--only", QUICK]);
+    assert_eq!(code, Some(0), "{text}");
+}
+
+#[test]
+fn the_example_in_rust_keeps_every_promise() {
+    let (code, text) = validate(&built("polyptych_occlusion"), &["--only", QUICK]);
+    assert_eq!(code, Some(0), "{text}");
+}
+
+/// Returns the code of the tutorial in a language.
+fn tutorial(language: &str) -> String {
+    let text = std::fs::read_to_string(libraries::source("docs/write_a_backend.md")).unwrap();
+    let code = text.split(&format!("```{language}\n")).nth(1).and_then(|rest| rest.split("```").next());
+    code.unwrap_or_default().to_owned()
+}
+
+#[test]
+fn the_tutorial_in_c_keeps_every_promise() {
+    let folder = folder("tutorial");
+    let source = folder.join("balls.c");
+    std::fs::write(&source, tutorial("c")).unwrap();
+    let library = folder.join("libballs.so");
+    let strict = ["-std=c99", "-Wpedantic"];
+    // `compiled` takes files of the project; an absolute one stays as it is.
+    let Some(()) = compiled(source.to_str().unwrap(), &library, &strict) else { return };
+    let (code, text) = validate(&library, &["--only", QUICK]);
+    assert_eq!(code, Some(0), "{text}");
+}
+
+#[test]
+fn the_tutorial_in_rust_keeps_every_promise() {
+    let built_from =
+        std::fs::read_to_string(libraries::source("plugins/fixtures/tutorial/src/lib.rs")).unwrap();
+    assert!(tutorial("rust") == built_from, "docs/write_a_backend.md and plugins/fixtures/tutorial differ");
+    let (code, text) = validate(&built("polyptych_tutorial"), &["--only", QUICK]);
+    assert_eq!(code, Some(0), "{text}");
+}
+
+#[test]
+fn faults_are_named() {
+    for (fault, check, words) in [
+        ("segfault", "second-frame", "touched memory that is not its own"),
+        ("out-of-bounds", "sizes", "touched memory that is not its own"),
+        ("overflow", "second-frame", "overflowed its stack"),
+        ("exit", "second-frame", "ended its process with code 0"),
+        ("hang", "second-frame", "gave no sign for"),
+        ("nan", "sizes", "numbers are not finite"),
+        ("flicker", "second-frame", "a second frame differs: color"),
+        ("leak", "keeps-no-memory", "more bytes"),
+        ("lie", "accounts", "does not say how it is drawn"),
+        ("unwritten", "every-pixel", "pixels of color are not written"),
+        ("fail", "second-frame", "it does not say why"),
+    ] {
+        let library = folder(&format!("validate-{fault}")).join("libanimal.so");
+        let initial = format!("-DINITIAL=\"{fault}\"");
+        let Some(()) = compiled("plugins/fixtures/zoo/zoo.c", &library, &[&initial]) else { return };
+        let (code, text) = validate(&library, &["--only", check, "--timeout", "4"]);
+        assert_eq!(code, Some(4), "{fault}: {text}");
+        assert!(text.starts_with(&format!("FAILED {check}: ")) && text.contains(words), "{fault}: {text}");
+    }
+}
+
+#[test]
+fn what_is_refused_is_refused_input_and_unknown_checks_are_wrong_use() {
+    let (code, text) = validate(Path::new("Cargo.toml"), &[]);
+    assert_eq!((code, text.lines().count()), (Some(3), 1), "{text}");
+    let (code, text) = validate(&built("polyptych_template"), &["--only", "beauty"]);
+    assert!(code == Some(2) && text.contains("same-bytes, second-frame"), "{text}");
+}
