@@ -251,4 +251,20 @@ fn the_command_survives_a_plugin_that_crashes() {
         "{error}"
     );
     assert!(!out.exists());
+    // A comparison keeps the other panels.
+    let out = dir.join("compare");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_polyptych"));
+    command.args(["compare", "builtin:polyhedra", "-b", "animal,raster", "--set", "animal.fault=overflow"]);
+    let done =
+        command.args(["--size", "32x32", "-o"]).arg(&out).arg("--plugin-dir").arg(dir).output().unwrap();
+    let error = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(1), "{error}");
+    assert!(error.contains("error: animal: `render` crashed: it overflowed its stack, in row 16"), "{error}");
+    assert!(error.contains("left out: animal"), "{error}");
+    let numbers = std::fs::read_to_string(out.join("compare.json")).unwrap();
+    let numbers: serde_json::Value = serde_json::from_str(&numbers).unwrap();
+    assert_eq!(
+        (&numbers["panels"][0]["backend"], numbers["panels"].as_array().map(Vec::len)),
+        (&"raster".into(), Some(1))
+    );
 }

@@ -77,22 +77,22 @@ impl Pane {
     ) -> bool {
         let before = (self.backend.clone(), self.channel);
         ui.horizontal(|ui| {
-            egui::ComboBox::from_id_salt(("back end", number)).selected_text(&self.backend).show_ui(
-                ui,
-                |ui| {
+            let chosen = egui::ComboBox::from_id_salt(("back end", number))
+                .selected_text(&self.backend)
+                .show_ui(ui, |ui| {
                     for id in backends {
                         ui.selectable_value(&mut self.backend, id.clone(), id);
                     }
-                },
-            );
-            egui::ComboBox::from_id_salt(("channel", number)).selected_text(self.channel.name()).show_ui(
-                ui,
-                |ui| {
+                });
+            name(&chosen.response, &format!("back end of pane {}", number + 1));
+            let chosen = egui::ComboBox::from_id_salt(("channel", number))
+                .selected_text(self.channel.name())
+                .show_ui(ui, |ui| {
                     for channel in Channel::ALL {
                         ui.selectable_value(&mut self.channel, channel, channel.name());
                     }
-                },
-            );
+                });
+            name(&chosen.response, &format!("channel of pane {}", number + 1));
             let color =
                 if self.failure.is_some() { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
             let status = ui.label(RichText::new(self.status()).color(color));
@@ -127,6 +127,11 @@ impl Pane {
             });
         });
     }
+}
+
+/// Names a list to choose from for screen readers.
+pub(crate) fn name(list: &egui::Response, name: &str) {
+    list.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::ComboBox, true, name));
 }
 
 /// Divides a rectangle among panes, as square as can be.

@@ -1,5 +1,6 @@
 //! How are the parameters of a back end set? By a panel that is made from what it declares.
 
+use crate::pane::name;
 use eframe::egui;
 use polyptych::seam::{BackendInfo, Parameter, ParameterKind, Settings, Value};
 
@@ -47,11 +48,12 @@ fn field(ui: &mut egui::Ui, parameter: &Parameter, current: &Value, label: egui:
         }
         (ParameterKind::Choice { choices }, Value::Text(value)) => {
             let mut chosen = value.as_str();
-            egui::ComboBox::from_id_salt("choice").selected_text(chosen).show_ui(ui, |ui| {
+            let list = egui::ComboBox::from_id_salt("choice").selected_text(chosen).show_ui(ui, |ui| {
                 for choice in choices {
                     ui.selectable_value(&mut chosen, *choice, *choice);
                 }
             });
+            name(&list.response, parameter.name);
             (chosen != value).then(|| chosen.to_owned())
         }
         (ParameterKind::Color, Value::Text(value)) => {

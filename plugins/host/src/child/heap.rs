@@ -17,6 +17,8 @@ const BASE: usize = 0x2000_0000_0000;
 /// Most children at once.
 const MOST: usize = 512;
 pub(super) const PAGE: usize = 4096;
+/// Bytes that go to the system when they are given back.
+const LARGE: usize = 1 << 26;
 
 /// Parts of the address space that are in use.
 static USED: Mutex<[bool; MOST]> = Mutex::new([false; MOST]);
@@ -80,15 +82,14 @@ impl Heap {
         Some(at)
     }
 
-    /// Gives pages back, and their memory to the system.
+    /// Gives pages back. The memory of many goes to the system; that of a few stays, since new pages cost more than
+    /// copying into old ones.
     pub(super) fn give_back(&self, at: usize, bytes: usize) {
         let bytes = bytes.max(1).next_multiple_of(PAGE);
-        let _ = fallocate(
-            &self.file,
-            FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE,
-            at as u64,
-            bytes as u64,
-        );
+        if bytes >= LARGE {
+            let flags = FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE;
+            let _ = fallocate(&self.file, flags, at as u64, bytes as u64);
+        }
         let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
         let (mut at, mut bytes) = (at, bytes);
         if let Some((&before, &length)) = free.range(..at).next_back()

@@ -100,7 +100,7 @@ pub(super) fn put_camera(to: &mut Writer, camera: &Camera) {
     });
     if let Projection::Warp(table) = &camera.projection {
         to.u32(table.columns()).u32(table.rows());
-        table.directions().iter().flat_map(|d| d.to_array()).for_each(|v| {
+        table.directions().iter().flat_map(DVec3::to_array).for_each(|v| {
             to.f64(v);
         });
     }

@@ -22,8 +22,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// How often the host looks whether it wants to stop.
+/// How often the host looks whether it wants to stop, and where nobody can stop it: each look takes time from the child.
 const LOOK: Duration = Duration::from_millis(1);
+const LOOK_SELDOM: Duration = Duration::from_millis(20);
 /// Most pictures whose memory is kept.
 const MOST_BUFFERS: usize = 4;
 
@@ -123,6 +124,7 @@ impl Peer {
         let stops = control.is_cancelled();
         self.heap.stop().store(stops, Ordering::Release);
         let Some(process) = self.process.as_mut() else { return Err(RenderError::NotPrepared) };
+        let look = if control.cancel_flag().is_some() { LOOK } else { LOOK_SELDOM };
         let mut sign = Instant::now();
         let mut stopped = stops.then(Instant::now);
         let mut received: Result<Option<Message>, Gone> = process.send(message).map(|()| None);
@@ -170,7 +172,7 @@ impl Peer {
                     self.limits.silence.as_secs_f64()
                 );
             }
-            received = process.receive(LOOK);
+            received = process.receive(look);
         };
         self.process = None;
         let place = rows.map_or(String::new(), |rows| rows.place());

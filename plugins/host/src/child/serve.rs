@@ -32,6 +32,7 @@ use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Serves a plugin, if this program was started for that, and then ends the process.
 pub(crate) fn serve() {
@@ -122,14 +123,48 @@ struct Server {
     owner: Arc<()>,
 }
 
-/// Tells the host about finished rows.
-struct Announcer<'a>(&'a Line);
+/// Tells the host about finished rows, not more often than people could see: each message wakes the host. What a crash
+/// keeps from being told is drawn again.
+struct Announcer<'a> {
+    line: &'a Line,
+    untold: Mutex<Untold>,
+}
+
+/// Rows that the host was not told about.
+#[derive(Default)]
+struct Untold {
+    bands: Vec<(u32, u32)>,
+    told: Option<Instant>,
+}
+
+/// Time between two messages about rows.
+const PAUSE: Duration = Duration::from_millis(5);
+
+impl Announcer<'_> {
+    fn tell(&self, untold: &mut Untold) {
+        for (first_row, rows) in untold.bands.drain(..) {
+            let mut message = Writer::new(FINISHED);
+            message.u32(first_row).u32(rows);
+            send(self.line, &message.finish());
+        }
+        untold.told = Some(Instant::now());
+    }
+
+    fn tell_the_rest(&self) {
+        self.tell(&mut self.untold.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+}
 
 impl Watcher for Announcer<'_> {
     fn finished(&self, band: &Band<'_>) {
-        let mut message = Writer::new(FINISHED);
-        message.u32(band.first_row).u32(band.rows);
-        send(self.0, &message.finish());
+        let mut untold = self.untold.lock().unwrap_or_else(PoisonError::into_inner);
+        match untold.bands.last_mut() {
+            Some((first, rows)) if *first + *rows == band.first_row => *rows += band.rows,
+            _ => untold.bands.push((band.first_row, band.rows)),
+        }
+        if untold.told.is_none_or(|told| told.elapsed() >= PAUSE) {
+            self.tell(&mut untold);
+        }
     }
 }
 
@@ -227,10 +262,12 @@ impl Server {
         let mut picture = self
             .picture(layout)
             .ok_or_else(|| RenderError::Failed("the picture's memory cannot be mapped".to_owned()))?;
-        let announcer = Announcer(&self.line);
+        let announcer = Announcer { line: &self.line, untold: Mutex::default() };
         let control = Control::new(pool).cancelled_by(self.stop()).watched_by(&announcer);
         let (callee, told) = (&mut self.callee, &mut self.told);
-        pool.install(|| callee.render(camera, &mut picture, &control, told))
+        let status = pool.install(|| callee.render(camera, &mut picture, &control, told));
+        announcer.tell_the_rest();
+        status
     }
 
     /// Makes a framebuffer over windows on the planes.
