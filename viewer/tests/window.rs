@@ -1,5 +1,6 @@
 //! Does the viewer do what its user asks, without a display?
 
+use eframe::egui::accesskit::Role;
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -107,8 +108,7 @@ fn a_parameter_changes_the_picture_and_is_kept() {
     harness.get_by_label("Settings").click();
     rest(&mut harness);
     drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
-    let shadow = harness.get_all_by_label("on").next().expect("the switch for shadows");
-    shadow.click();
+    harness.get_by_role(Role::CheckBox).click();
     rest(&mut harness);
     let set = |harness: &Harness<'_, Viewer>| harness.state().settings("raster").iter().count();
     assert_eq!(set(&harness), 1);
