@@ -13,7 +13,7 @@ pub(crate) fn panel(ui: &mut egui::Ui, info: &BackendInfo, settings: &mut Settin
     for parameter in &info.parameters {
         let current = settings.get(&info.parameters, parameter.name).clone();
         let label = ui.label(parameter.name).on_hover_text(parameter.help);
-        ui.push_id(parameter.name, |ui| {
+        ui.push_id((&info.id, parameter.name), |ui| {
             if let Some(text) = field(ui, parameter, &current, label.id) {
                 changed |= settings.set(&info.id, &info.parameters, parameter.name, &text).is_ok();
             }

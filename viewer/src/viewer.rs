@@ -227,7 +227,7 @@ impl Viewer {
 
     /// Does what the keys say. Tells whether pictures change.
     fn take_keys(&mut self, ctx: &egui::Context) -> bool {
-        if ctx.egui_wants_keyboard_input() {
+        if ctx.text_edit_focused() {
             return false;
         }
         const DIGITS: [Key; 9] = [
@@ -254,6 +254,11 @@ impl Viewer {
         {
             changed |= pane.backend != *id;
             pane.backend.clone_from(id);
+            // The panel shows other parameters now: none of them is to take the next key.
+            ctx.memory_mut(|memory| memory.stop_text_input());
+            if let Some(focused) = ctx.memory(|memory| memory.focused()) {
+                ctx.memory_mut(|memory| memory.surrender_focus(focused));
+            }
         }
         if frame {
             let [width, height] = self.panes.get(self.active).map_or([1, 1], |pane| pane.size);

@@ -22,8 +22,8 @@ fn window(scene: &str) -> Harness<'static, Viewer> {
 /// Lets the painters finish.
 fn rest(harness: &mut Harness<'_, Viewer>) {
     let begin = Instant::now();
-    harness.step();
-    harness.step();
+    // Events that wait are handed over one a step.
+    harness.run_steps(8);
     while !harness.state().is_at_rest() {
         assert!(begin.elapsed() < Duration::from_secs(100), "the panes never come to rest");
         std::thread::sleep(Duration::from_millis(5));
