@@ -131,7 +131,7 @@ impl Pane {
 
 /// Names a list to choose from for screen readers.
 pub(crate) fn name(list: &egui::Response, name: &str) {
-    list.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::ComboBox, true, name));
+    list.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, name));
 }
 
 /// Divides a rectangle among panes, as square as can be.

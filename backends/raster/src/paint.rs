@@ -288,9 +288,9 @@ impl<'a> TilePainter<'_, 'a, '_> {
     fn finish(&mut self, batch: &mut Batch<'a>) {
         self.painter.light(batch, &self.faces.faces);
         let mut index = [0; BATCH];
-        for i in 0..batch.count {
-            let (x, y) = self.place(batch.tag[i]);
-            index[i] = ((y - self.band.first_row) * self.band.width + x) as usize;
+        for (index, tag) in index.iter_mut().zip(&batch.tag[..batch.count]) {
+            let (x, y) = self.place(*tag);
+            *index = ((y - self.band.first_row) * self.band.width + x) as usize;
         }
         if batch.tag[..batch.count].iter().any(|tag| tag & LAYER != 0) {
             for (i, &index) in index[..batch.count].iter().enumerate() {

@@ -75,7 +75,7 @@ struct Plane {
 
 impl Blocker {
     fn plane(&self) -> Plane {
-        let [a, b, c] = self.0.map(|p| p.as_dvec3());
+        let [a, b, c] = self.0.map(Vec3::as_dvec3);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         Plane { normal, offset: normal.dot(a) }
     }
@@ -335,7 +335,7 @@ fn blockers(model: &Model, origin: DVec3, threads: &dyn Threads) -> Vec<Blocker>
         let count = part.mesh().triangles.len();
         let of_part = &mut blockers[part.first_triangle as usize..][..count];
         for_each_mut(threads, of_part, 1024, &|triangle, blocker| {
-            *blocker = Blocker(part.corners(triangle, origin).map(|p| p.as_vec3()));
+            *blocker = Blocker(part.corners(triangle, origin).map(DVec3::as_vec3));
         });
     }
     blockers
