@@ -206,7 +206,8 @@ mod tests {
 
     #[test]
     fn many_points_are_lit_as_one_by_one() {
-        let unit = |i: usize, k: f32| Vec3::new((i as f32 * k).sin(), (i as f32 + k).cos(), 0.3).normalize();
+        let unit =
+            |i: usize, k: f32| Vec3::new((i as f32 * k).sin(), (i as f32 + k).cos(), 0.3).normalize_or_zero();
         let eight = |of: &dyn Fn(usize) -> Vec3, first: usize| {
             let mut all = Vec3x8::splat(Vec3::ZERO);
             (0..8).for_each(|i| all.set(i, of(first + i)));

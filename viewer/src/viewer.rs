@@ -255,10 +255,11 @@ impl Viewer {
             changed |= pane.backend != *id;
             pane.backend.clone_from(id);
             // The panel shows other parameters now: none of them is to take the next key.
-            ctx.memory_mut(|memory| memory.stop_text_input());
-            if let Some(focused) = ctx.memory(|memory| memory.focused()) {
-                ctx.memory_mut(|memory| memory.surrender_focus(focused));
-            }
+            ctx.memory_mut(|memory| {
+                if let Some(focused) = memory.focused() {
+                    memory.surrender_focus(focused);
+                }
+            });
         }
         if frame {
             let [width, height] = self.panes.get(self.active).map_or([1, 1], |pane| pane.size);
