@@ -144,7 +144,8 @@ mod tests {
         let tree = Tree::new(triangles.clone());
         let mut hits = 0;
         for _ in 0..500 {
-            let ray = Ray { origin: point(2.0), direction: point(1.0).normalize_or(DVec3::X) };
+            let origin = point(2.0);
+            let ray = Ray { origin, direction: (point(0.7) - origin).normalize_or(DVec3::X) };
             let all = triangles.iter().filter_map(|t| t.meets(&ray)).map(|(d, ..)| d);
             let nearest = all.filter(|d| *d >= 0.0).fold(f64::INFINITY, f64::min);
             let found = tree.nearest(&ray, 0.0, f64::INFINITY);

@@ -201,7 +201,17 @@ impl Peer {
             }
         };
         if buffer.layout.pixels() > 0 {
-            *target = buffer.framebuffer()?;
+            let mut shared = buffer.framebuffer()?;
+            // What the plugin leaves alone stays as the caller had it, wherever the picture lies.
+            let to = shared.band();
+            to.color.copy_from_slice(target.color());
+            to.distance.copy_from_slice(target.distance());
+            to.normal.copy_from_slice(target.normal());
+            to.id.copy_from_slice(target.id());
+            to.albedo.copy_from_slice(target.albedo());
+            to.shadow.copy_from_slice(target.shadow());
+            to.coverage.copy_from_slice(target.coverage());
+            *target = shared;
         }
         Some(buffer.layout)
     }
