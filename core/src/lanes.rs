@@ -100,6 +100,9 @@ numbers!(F64x8, f64: Add add +, Sub sub -, Mul mul *, Div div /);
 numbers!(I32x8, i32: Add add +, Sub sub -, Mul mul *, BitOr bitor |, BitAnd bitand &);
 
 impl F32x8 {
+    /// Zeros.
+    pub const ZERO: Self = Self([0.0; LANES]);
+
     /// Returns the smaller ones; the other where one is not a number.
     #[must_use]
     #[inline(always)]

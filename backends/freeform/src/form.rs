@@ -5,10 +5,10 @@
 //! in packets.
 
 use crate::bundle::{Bundle, Crossing, Hit};
-use crate::lanes::{LANES, Lanes, Mask};
 use crate::program::{Active, Program, Step, value_and_gradient};
 use crate::roots::{RayQuadric, Stack, first_roots};
 use glam::{DAffine3, DVec3};
+use polyptych_core::lanes::{F32x8, LANES, Mask8};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{FreeForm, Quadric};
 
@@ -65,7 +65,7 @@ impl FormBody {
     ) {
         self.enter(object_from_world, bundle, hits, &mut scratch.alive);
         let Some((near, far)) = self.slice(scratch) else { return };
-        let zero = RayQuadric { a: Lanes::ZERO, b: Lanes::ZERO, c: Lanes::ZERO, error: Lanes::ZERO };
+        let zero = RayQuadric { a: F32x8::ZERO, b: F32x8::ZERO, c: F32x8::ZERO, error: F32x8::ZERO };
         if scratch.leaves.len() < self.program.leaves.len() {
             scratch.leaves.resize(self.program.leaves.len(), zero);
         }
@@ -169,7 +169,7 @@ pub(crate) struct RayPacket {
     to: [f64; LANES],
     /// How far from the points the polynomials are looked at.
     reach: [f64; LANES],
-    open: Mask,
+    open: Mask8,
 }
 
 impl RayPacket {
@@ -196,7 +196,7 @@ impl RayPacket {
         from: [0.0; LANES],
         to: [0.0; LANES],
         reach: [0.0; LANES],
-        open: Mask::NONE,
+        open: Mask8::NONE,
     };
 
     #[inline]
@@ -220,8 +220,8 @@ impl RayPacket {
         out
     }
 
-    fn stretch(&self) -> (Lanes, Lanes) {
-        let (mut from, mut to) = (Lanes::ZERO, Lanes::ZERO);
+    fn stretch(&self) -> (F32x8, F32x8) {
+        let (mut from, mut to) = (F32x8::ZERO, F32x8::ZERO);
         for i in 0..LANES {
             (from.0[i], to.0[i]) = (self.from[i] as f32, self.to[i] as f32);
         }
@@ -252,7 +252,7 @@ impl RayPacket {
     #[inline(always)]
     fn quadric_along(&self, q: &Quadric) -> RayQuadric {
         let [qa, qb, qc, qd, qe, qf, qg, qh, qi, qk] = q.0;
-        let mut out = RayQuadric { a: Lanes::ZERO, b: Lanes::ZERO, c: Lanes::ZERO, error: Lanes::ZERO };
+        let mut out = RayQuadric { a: F32x8::ZERO, b: F32x8::ZERO, c: F32x8::ZERO, error: F32x8::ZERO };
         let ([px, py, pz], [dx, dy, dz]) = (&self.points, &self.directions);
         for i in 0..LANES {
             let (x, y, z, u, v, w) = (px[i], py[i], pz[i], dx[i], dy[i], dz[i]);

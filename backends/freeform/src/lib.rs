@@ -16,7 +16,6 @@ mod field;
 mod form;
 mod frame;
 mod heights;
-mod lanes;
 mod program;
 mod renderer;
 mod roots;

@@ -7,8 +7,8 @@
 //! [`FINEST`] of the stretch.
 
 use crate::bundle::Crossing;
-use crate::lanes::{LANES, Lanes, Mask};
 use crate::program::Step;
+use polyptych_core::lanes::{F32x8, LANES, Mask8};
 use polyptych_core::scene::Power;
 
 /// Shortest stretch that is still halved, as a share of the whole: the resolution of single precision.
@@ -20,43 +20,43 @@ const ROUNDING: f32 = 1.0 / (1 << 22) as f32;
 /// A quadric along eight rays: `a u^2 + b u + c`, with a bound on the rounding error over the whole stretch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayQuadric {
-    pub(crate) a: Lanes,
-    pub(crate) b: Lanes,
-    pub(crate) c: Lanes,
-    pub(crate) error: Lanes,
+    pub(crate) a: F32x8,
+    pub(crate) b: F32x8,
+    pub(crate) c: F32x8,
+    pub(crate) error: F32x8,
 }
 
 /// Bounds of a function and its derivative over a stretch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
-    lo: Lanes,
-    hi: Lanes,
-    slope_lo: Lanes,
-    slope_hi: Lanes,
+    lo: F32x8,
+    hi: F32x8,
+    slope_lo: F32x8,
+    slope_hi: F32x8,
 }
 
 impl Range {
     pub(crate) const ZERO: Self =
-        Self { lo: Lanes::ZERO, hi: Lanes::ZERO, slope_lo: Lanes::ZERO, slope_hi: Lanes::ZERO };
+        Self { lo: F32x8::ZERO, hi: F32x8::ZERO, slope_lo: F32x8::ZERO, slope_hi: F32x8::ZERO };
 }
 
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(crate) struct Stack {
     pub(crate) ranges: Vec<Range>,
-    pub(crate) values: Vec<(Lanes, Lanes)>,
+    pub(crate) values: Vec<(F32x8, F32x8)>,
 }
 
 /// Finds the first root of each active ray in `[from, to]`. Returns which rays have one, and where.
 pub(crate) fn first_roots(
     steps: &[Step],
     leaves: &[RayQuadric],
-    from: Lanes,
-    to: Lanes,
-    active: Mask,
+    from: F32x8,
+    to: F32x8,
+    active: Mask8,
     crossing: Crossing,
     stack: &mut Stack,
-) -> (Mask, Lanes) {
+) -> (Mask8, F32x8) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         #[expect(unsafe_code, reason = "a kernel compiled for a processor feature can only be called so")]
@@ -71,12 +71,12 @@ pub(crate) fn first_roots(
 fn first_roots_avx2(
     steps: &[Step],
     leaves: &[RayQuadric],
-    from: Lanes,
-    to: Lanes,
-    active: Mask,
+    from: F32x8,
+    to: F32x8,
+    active: Mask8,
     crossing: Crossing,
     stack: &mut Stack,
-) -> (Mask, Lanes) {
+) -> (Mask8, F32x8) {
     search(steps, leaves, from, to, active, crossing, stack)
 }
 
@@ -84,31 +84,31 @@ fn first_roots_avx2(
 fn search(
     steps: &[Step],
     leaves: &[RayQuadric],
-    from: Lanes,
-    to: Lanes,
-    active: Mask,
+    from: F32x8,
+    to: F32x8,
+    active: Mask8,
     crossing: Crossing,
     stack: &mut Stack,
-) -> (Mask, Lanes) {
-    let half = Lanes::splat(0.5);
-    let shortest = (to - from) * Lanes::splat(FINEST);
+) -> (Mask8, F32x8) {
+    let half = F32x8::splat(0.5);
+    let shortest = (to - from) * F32x8::splat(FINEST);
     let mut begin = from;
     let mut length = (to - from) * half;
     let mut open = active & to.at_least(from);
-    let (mut hit, mut root) = (Mask::NONE, Lanes::ZERO);
+    let (mut hit, mut root) = (Mask8::NONE, F32x8::ZERO);
     while open.any() {
         let end = (begin + length).min(to);
         let range = bound(steps, leaves, begin, end, &mut stack.ranges);
-        let excluded = (range.lo.above(Lanes::ZERO) | (-range.hi).above(Lanes::ZERO)) & open;
-        let monotone = range.slope_lo.above(Lanes::ZERO) | (-range.slope_hi).above(Lanes::ZERO);
+        let excluded = (range.lo.above(F32x8::ZERO) | (-range.hi).above(F32x8::ZERO)) & open;
+        let monotone = range.slope_lo.above(F32x8::ZERO) | (-range.slope_hi).above(F32x8::ZERO);
         let tiny = shortest.at_least(length);
         let search = (monotone | tiny) & open & !excluded;
         let mut passed = excluded;
         if search.any() {
             let (at_begin, _) = value(steps, leaves, begin, &mut stack.values);
             let (at_end, _) = value(steps, leaves, end, &mut stack.values);
-            let inside = at_begin.at_least(Lanes::ZERO);
-            let ends_inside = at_end.at_least(Lanes::ZERO);
+            let inside = at_begin.at_least(F32x8::ZERO);
+            let ends_inside = at_end.at_least(F32x8::ZERO);
             let change = match crossing {
                 Crossing::Any => (inside & !ends_inside) | (!inside & ends_inside),
                 Crossing::Entry => !inside & ends_inside,
@@ -134,20 +134,20 @@ fn search(
 fn refine(
     steps: &[Step],
     leaves: &[RayQuadric],
-    mut lo: Lanes,
-    mut hi: Lanes,
-    inside_at_lo: Mask,
-    values: &mut Vec<(Lanes, Lanes)>,
-) -> Lanes {
-    let half = Lanes::splat(0.5);
+    mut lo: F32x8,
+    mut hi: F32x8,
+    inside_at_lo: Mask8,
+    values: &mut Vec<(F32x8, F32x8)>,
+) -> F32x8 {
+    let half = F32x8::splat(0.5);
     let mut u = (lo + hi) * half;
     for _ in 0..7 {
         let (f, slope) = value(steps, leaves, u, values);
-        let inside = f.at_least(Lanes::ZERO);
+        let inside = f.at_least(F32x8::ZERO);
         let same = (inside & inside_at_lo) | (!inside & !inside_at_lo);
         lo = same.pick(u, lo);
         hi = same.pick(hi, u);
-        let newton = u - f.over(slope);
+        let newton = u - f / slope;
         let within = newton.at_least(lo) & hi.at_least(newton);
         u = within.pick(newton, (lo + hi) * half);
     }
@@ -156,7 +156,7 @@ fn refine(
 
 /// Evaluates the form and its derivative along the rays.
 #[inline(always)]
-fn value(steps: &[Step], leaves: &[RayQuadric], u: Lanes, stack: &mut Vec<(Lanes, Lanes)>) -> (Lanes, Lanes) {
+fn value(steps: &[Step], leaves: &[RayQuadric], u: F32x8, stack: &mut Vec<(F32x8, F32x8)>) -> (F32x8, F32x8) {
     stack.clear();
     for &step in steps {
         if let Step::Leaf(leaf) = step {
@@ -166,18 +166,18 @@ fn value(steps: &[Step], leaves: &[RayQuadric], u: Lanes, stack: &mut Vec<(Lanes
         }
         let Some((b, db)) = stack.pop() else { break };
         if let Step::Neg | Step::Add(_) = step {
-            stack.push(if let Step::Add(c) = step { (b + Lanes::splat(c as f32), db) } else { (-b, -db) });
+            stack.push(if let Step::Add(c) = step { (b + F32x8::splat(c as f32), db) } else { (-b, -db) });
             continue;
         }
         let Some((a, da)) = stack.pop() else { break };
         stack.push(match step {
             Step::Term { weight, power } => {
-                let (w, q) = (Lanes::splat(weight as f32), b.max(Lanes::ZERO));
+                let (w, q) = (F32x8::splat(weight as f32), b.max(F32x8::ZERO));
                 match power {
                     Power::Square => (a + w * (q * q), da + w * (q + q) * db),
                     Power::Cube => {
                         let q2 = q * q;
-                        (a + w * (q2 * q), da + w * (Lanes::splat(3.0) * q2) * db)
+                        (a + w * (q2 * q), da + w * (F32x8::splat(3.0) * q2) * db)
                     }
                 }
             }
@@ -193,27 +193,27 @@ fn value(steps: &[Step], leaves: &[RayQuadric], u: Lanes, stack: &mut Vec<(Lanes
                 let (first, k) = (a.at_least(b), k as f32);
                 let (top, low) = (first.pick(a, b), first.pick(b, a));
                 let (dtop, dlow) = (first.pick(da, db), first.pick(db, da));
-                let overlap = (Lanes::splat(k) - (top - low)).max(Lanes::ZERO);
-                let share = overlap * Lanes::splat(0.5 / k);
-                (top + overlap * overlap * Lanes::splat(0.25 / k), dtop + (dlow - dtop) * share)
+                let overlap = (F32x8::splat(k) - (top - low)).max(F32x8::ZERO);
+                let share = overlap * F32x8::splat(0.5 / k);
+                (top + overlap * overlap * F32x8::splat(0.25 / k), dtop + (dlow - dtop) * share)
             }
             Step::Mix(t) => {
-                let (s, t) = (Lanes::splat((1.0 - t) as f32), Lanes::splat(t as f32));
+                let (s, t) = (F32x8::splat((1.0 - t) as f32), F32x8::splat(t as f32));
                 (a * s + b * t, da * s + db * t)
             }
             Step::Torus(ring) => {
-                let ring = Lanes::splat(ring as f32);
+                let ring = F32x8::splat(ring as f32);
                 (ring * a - b * b, ring * da - (b + b) * db)
             }
             Step::Leaf(_) | Step::Neg | Step::Add(_) => (a, da),
         });
     }
-    stack.first().copied().unwrap_or((Lanes::splat(-1.0), Lanes::ZERO))
+    stack.first().copied().unwrap_or((F32x8::splat(-1.0), F32x8::ZERO))
 }
 
 /// Bounds the form and its derivative over `[u0, u1]`.
 #[inline(always)]
-fn bound(steps: &[Step], leaves: &[RayQuadric], u0: Lanes, u1: Lanes, stack: &mut Vec<Range>) -> Range {
+fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mut Vec<Range>) -> Range {
     stack.clear();
     for &step in steps {
         if let Step::Leaf(leaf) = step {
@@ -226,7 +226,7 @@ fn bound(steps: &[Step], leaves: &[RayQuadric], u0: Lanes, u1: Lanes, stack: &mu
             continue;
         }
         if let Step::Add(c) = step {
-            let c = Lanes::splat(c as f32);
+            let c = F32x8::splat(c as f32);
             stack.push(widened(Range { lo: b.lo + c, hi: b.hi + c, ..b }));
             continue;
         }
@@ -244,28 +244,28 @@ fn bound(steps: &[Step], leaves: &[RayQuadric], u0: Lanes, u1: Lanes, stack: &mu
             Step::Torus(ring) => {
                 let (s_lo, s_hi) = square(b.lo, b.hi);
                 let (p_lo, p_hi) = product(b.lo, b.hi, b.slope_lo, b.slope_hi);
-                let two = Lanes::splat(-2.0);
+                let two = F32x8::splat(-2.0);
                 let minus = Range { lo: -s_hi, hi: -s_lo, slope_lo: p_hi * two, slope_hi: p_lo * two };
                 sum(scaled(a, ring as f32), minus)
             }
             Step::Leaf(_) | Step::Neg | Step::Add(_) => a,
         }));
     }
-    stack.first().copied().unwrap_or(Range { lo: Lanes::splat(-1.0), hi: Lanes::splat(-1.0), ..Range::ZERO })
+    stack.first().copied().unwrap_or(Range { lo: F32x8::splat(-1.0), hi: F32x8::splat(-1.0), ..Range::ZERO })
 }
 
 /// Bounds a parabola exactly: by its ends, and its vertex where that lies between.
 #[inline(always)]
-fn leaf_range(q: &RayQuadric, u0: Lanes, u1: Lanes) -> Range {
-    let at = |u: Lanes| (q.a * u + q.b) * u + q.c;
+fn leaf_range(q: &RayQuadric, u0: F32x8, u1: F32x8) -> Range {
+    let at = |u: F32x8| (q.a * u + q.b) * u + q.c;
     let (f0, f1) = (at(u0), at(u1));
     let (slope0, slope1) = ((q.a + q.a) * u0 + q.b, (q.a + q.a) * u1 + q.b);
-    let turns = (-(slope0 * slope1)).above(Lanes::ZERO);
-    let vertex = q.c - (q.b * q.b).over(q.a * Lanes::splat(4.0));
+    let turns = (-(slope0 * slope1)).above(F32x8::ZERO);
+    let vertex = q.c - (q.b * q.b) / (q.a * F32x8::splat(4.0));
     let (mut lo, mut hi) = (f0.min(f1), f0.max(f1));
     lo = turns.pick(lo.min(vertex), lo);
     hi = turns.pick(hi.max(vertex), hi);
-    let slope_error = (slope0.abs() + slope1.abs() + q.b.abs()) * Lanes::splat(ROUNDING);
+    let slope_error = (slope0.abs() + slope1.abs() + q.b.abs()) * F32x8::splat(ROUNDING);
     Range {
         lo: lo - q.error,
         hi: hi + q.error,
@@ -276,7 +276,7 @@ fn leaf_range(q: &RayQuadric, u0: Lanes, u1: Lanes) -> Range {
 
 #[inline(always)]
 fn widened(r: Range) -> Range {
-    let e = Lanes::splat(ROUNDING);
+    let e = F32x8::splat(ROUNDING);
     Range {
         lo: r.lo - r.lo.abs() * e,
         hi: r.hi + r.hi.abs() * e,
@@ -286,21 +286,21 @@ fn widened(r: Range) -> Range {
 }
 
 #[inline(always)]
-fn square(lo: Lanes, hi: Lanes) -> (Lanes, Lanes) {
+fn square(lo: F32x8, hi: F32x8) -> (F32x8, F32x8) {
     let (a, b) = (lo * lo, hi * hi);
-    let holds_zero = Lanes::ZERO.at_least(lo) & hi.at_least(Lanes::ZERO);
-    (holds_zero.pick(Lanes::ZERO, a.min(b)), a.max(b))
+    let holds_zero = F32x8::ZERO.at_least(lo) & hi.at_least(F32x8::ZERO);
+    (holds_zero.pick(F32x8::ZERO, a.min(b)), a.max(b))
 }
 
 #[inline(always)]
-fn product(a_lo: Lanes, a_hi: Lanes, b_lo: Lanes, b_hi: Lanes) -> (Lanes, Lanes) {
+fn product(a_lo: F32x8, a_hi: F32x8, b_lo: F32x8, b_hi: F32x8) -> (F32x8, F32x8) {
     let (p, q, r, s) = (a_lo * b_lo, a_lo * b_hi, a_hi * b_lo, a_hi * b_hi);
     (p.min(q).min(r.min(s)), p.max(q).max(r.max(s)))
 }
 
 #[inline(always)]
 fn scaled(r: Range, factor: f32) -> Range {
-    let f = Lanes::splat(factor);
+    let f = F32x8::splat(factor);
     if factor >= 0.0 {
         Range { lo: r.lo * f, hi: r.hi * f, slope_lo: r.slope_lo * f, slope_hi: r.slope_hi * f }
     } else {
@@ -311,7 +311,7 @@ fn scaled(r: Range, factor: f32) -> Range {
 #[inline(always)]
 fn sum(a: Range, b: Range) -> Range {
     // The sum may cancel: allow for the rounding of its parts.
-    let e = Lanes::splat(ROUNDING);
+    let e = F32x8::splat(ROUNDING);
     let lost = (a.lo.abs().max(a.hi.abs()) + b.lo.abs().max(b.hi.abs())) * e;
     let slope_lost = (a.slope_lo.abs().max(a.slope_hi.abs()) + b.slope_lo.abs().max(b.slope_hi.abs())) * e;
     Range {
@@ -324,12 +324,12 @@ fn sum(a: Range, b: Range) -> Range {
 
 #[inline(always)]
 fn term_range(base: Range, q: Range, weight: f32, power: Power) -> Range {
-    let (lo, hi) = (q.lo.max(Lanes::ZERO), q.hi.max(Lanes::ZERO));
+    let (lo, hi) = (q.lo.max(F32x8::ZERO), q.hi.max(F32x8::ZERO));
     let (raised_lo, raised_hi, outer_lo, outer_hi) = match power {
         Power::Square => (lo * lo, hi * hi, lo + lo, hi + hi),
         Power::Cube => {
             let (l2, h2) = (lo * lo, hi * hi);
-            (l2 * lo, h2 * hi, l2 * Lanes::splat(3.0), h2 * Lanes::splat(3.0))
+            (l2 * lo, h2 * hi, l2 * F32x8::splat(3.0), h2 * F32x8::splat(3.0))
         }
     };
     let (slope_lo, slope_hi) = product(outer_lo, outer_hi, q.slope_lo, q.slope_hi);
@@ -349,15 +349,15 @@ fn max_range(a: Range, b: Range) -> Range {
 fn smooth_range(a: Range, b: Range, k: f32) -> Range {
     let (gap_lo, gap_hi) = (a.lo - b.hi, a.hi - b.lo);
     let (n, f) = (gap_lo.abs().min(gap_hi.abs()), gap_lo.abs().max(gap_hi.abs()));
-    let crossing = Lanes::ZERO.at_least(gap_lo) & gap_hi.at_least(Lanes::ZERO);
-    let nearest = crossing.pick(Lanes::ZERO, n);
-    let fillet = |gap: Lanes| {
-        let overlap = (Lanes::splat(k) - gap).max(Lanes::ZERO);
-        overlap * overlap * Lanes::splat(0.25 / k)
+    let crossing = F32x8::ZERO.at_least(gap_lo) & gap_hi.at_least(F32x8::ZERO);
+    let nearest = crossing.pick(F32x8::ZERO, n);
+    let fillet = |gap: F32x8| {
+        let overlap = (F32x8::splat(k) - gap).max(F32x8::ZERO);
+        overlap * overlap * F32x8::splat(0.25 / k)
     };
     let top = max_range(a, b);
     // The slope is a mix of both slopes wherever the fillet reaches.
-    let mixes = Lanes::splat(k).at_least(nearest);
+    let mixes = F32x8::splat(k).at_least(nearest);
     Range {
         lo: top.lo + fillet(f),
         hi: top.hi + fillet(nearest),
@@ -397,12 +397,12 @@ mod tests {
             });
             let packet = crate::form::RayPacket::around(&rays, 3.0, 3.0);
             let leaves: Vec<_> = program.leaves.iter().map(|q| packet.quadric(q)).collect();
-            let all = Mask([u32::MAX; LANES]);
+            let all = Mask8([u32::MAX; LANES]);
             let (hit, root) = first_roots(
                 &program.steps,
                 &leaves,
-                Lanes::splat(-3.0),
-                Lanes::splat(3.0),
+                F32x8::splat(-3.0),
+                F32x8::splat(3.0),
                 all,
                 Crossing::Any,
                 &mut stack,
@@ -410,8 +410,8 @@ mod tests {
             let plain = search(
                 &program.steps,
                 &leaves,
-                Lanes::splat(-3.0),
-                Lanes::splat(3.0),
+                F32x8::splat(-3.0),
+                F32x8::splat(3.0),
                 all,
                 Crossing::Any,
                 &mut stack,
