@@ -1,6 +1,6 @@
 //! From where the scene is seen, and how directions become pixels.
 
-use crate::lanes::{I32x8, LANES, Vec3x8};
+use crate::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8, Vec3x8};
 use crate::math::{Aabb, Ray};
 use crate::scene::Background;
 use glam::{DMat3, DVec2, DVec3, Vec3};
@@ -267,6 +267,44 @@ impl View<'_> {
         Some(Ray { origin: camera.eye, direction })
     }
 
+    /// Returns the rays through eight places of a row of the picture, to the same bytes as [`View::ray`], and
+    /// which of them there are.
+    #[must_use]
+    #[inline(always)]
+    pub fn rays(&self, x: F64x8, y: f64) -> (DVec3x8, DVec3x8, Mask8) {
+        let (camera, half) = (self.camera, F64x8::splat(self.half));
+        let aspect = F64x8::splat(self.width / self.height);
+        let (one, two) = (F64x8::splat(1.0), F64x8::splat(2.0));
+        let u = x * two / F64x8::splat(self.width) - one;
+        let v = F64x8::splat(1.0 - y * 2.0 / self.height);
+        let turn = &camera.world_from_camera;
+        let eye = DVec3x8::splat(camera.eye);
+        match &camera.projection {
+            Projection::Perspective { .. } => {
+                let local = DVec3x8 { x: u * half * aspect, y: v * half, z: -one };
+                let direction = local.turned(turn);
+                let share = one / direction.length();
+                let there = share.above(F64x8::ZERO) & F64x8::splat(f64::INFINITY).above(share);
+                (eye, direction.scaled(share), there)
+            }
+            Projection::Orthographic { .. } => {
+                let shift = DVec3x8 { x: u * half * aspect, y: v * half, z: F64x8::ZERO };
+                (eye + shift.turned(turn), DVec3x8::splat(camera.forward()), Mask8::ALL)
+            }
+            Projection::Fisheye { .. } | Projection::Cylindrical { .. } | Projection::Warp(_) => {
+                let (mut origin, mut direction, mut there) = (eye, eye, Mask8::NONE);
+                for i in 0..LANES {
+                    if let Some(ray) = self.ray(x.0[i], y) {
+                        origin.set(i, ray.origin);
+                        direction.set(i, ray.direction);
+                        there.0[i] = u32::MAX;
+                    }
+                }
+                (origin, direction, there)
+            }
+        }
+    }
+
     /// Returns the directions of the rays through the centers of a row of pixels, where the projection keeps
     /// straight lines straight.
     #[must_use]
@@ -305,6 +343,28 @@ mod tests {
 
     fn camera(projection: Projection) -> Camera {
         Camera::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, projection)
+    }
+
+    #[test]
+    fn eight_rays_are_single_rays() {
+        for projection in [
+            Projection::Perspective { fov_y: 1.2 },
+            Projection::Orthographic { height: 3.0 },
+            Projection::Fisheye { fov: 3.0 },
+            Projection::Cylindrical { fov_x: 4.0, fov_y: 1.0 },
+        ] {
+            let camera = Camera::look_at(DVec3::new(1.0, 2.0, 5.0), DVec3::ZERO, DVec3::Y, projection);
+            let view = camera.view(37, 23);
+            for y in [0.5, 7.25, 22.5] {
+                let x = F64x8([0.5, 1.5, 7.75, 12.5, 18.5, 20.5, 35.5, 36.5]);
+                let (origin, direction, there) = view.rays(x, y);
+                for i in 0..LANES {
+                    let ray = view.ray(x.0[i], y);
+                    assert_eq!(there.has(i), ray.is_some());
+                    assert!(ray.is_none_or(|r| r.origin == origin.get(i) && r.direction == direction.get(i)));
+                }
+            }
+        }
     }
 
     #[test]

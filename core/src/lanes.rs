@@ -103,6 +103,13 @@ impl F32x8 {
     /// Zeros.
     pub const ZERO: Self = Self([0.0; LANES]);
 
+    /// Widens to double precision.
+    #[must_use]
+    #[inline(always)]
+    pub fn to_f64(self) -> F64x8 {
+        F64x8(lanes!(0.0, i => f64::from(self.0[i])))
+    }
+
     /// Returns the smaller ones; the other where one is not a number.
     #[must_use]
     #[inline(always)]
@@ -168,7 +175,69 @@ impl Neg for F32x8 {
     }
 }
 
+impl Neg for F64x8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(lanes!(0.0, i => -self.0[i]))
+    }
+}
+
 impl F64x8 {
+    /// Zeros.
+    pub const ZERO: Self = Self([0.0; LANES]);
+
+    /// Returns the smaller ones; the other where one is not a number.
+    #[must_use]
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self(lanes!(0.0, i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+
+    /// Returns the larger ones; the other where one is not a number.
+    #[must_use]
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self(lanes!(0.0, i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+
+    /// Returns them without sign.
+    #[must_use]
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self(lanes!(0.0, i => self.0[i].abs()))
+    }
+
+    /// Tells which are greater.
+    #[must_use]
+    #[inline(always)]
+    pub fn above(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] > other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Tells which are greater or equal.
+    #[must_use]
+    #[inline(always)]
+    pub fn at_least(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] >= other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Tells which are equal.
+    #[must_use]
+    #[inline(always)]
+    pub fn equal(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] == other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Takes `yes` where the mask is set, else `no`.
+    #[must_use]
+    #[inline(always)]
+    pub fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
+        let wide = |i: usize| i64::from(mask.0[i] as i32) as u64;
+        Self(lanes!(0.0, i =>
+            f64::from_bits((yes.0[i].to_bits() & wide(i)) | (no.0[i].to_bits() & !wide(i)))))
+    }
+
     /// Returns the square roots.
     #[must_use]
     #[inline(always)]
@@ -210,6 +279,23 @@ impl I32x8 {
 impl Mask8 {
     /// None.
     pub const NONE: Self = Self([0; LANES]);
+
+    /// All.
+    pub const ALL: Self = Self([u32::MAX; LANES]);
+
+    /// Sets the first ones, as many as asked.
+    #[must_use]
+    #[inline(always)]
+    pub fn first(count: usize) -> Self {
+        Self(lanes!(0_u32, i => if i < count { u32::MAX } else { 0 }))
+    }
+
+    /// Counts those that are set.
+    #[must_use]
+    #[inline(always)]
+    pub fn count(self) -> u32 {
+        self.0.iter().map(|&m| m & 1).sum()
+    }
 
     /// Reads eight words as they are.
     ///
@@ -376,6 +462,26 @@ impl Vec3x8 {
 }
 
 impl DVec3x8 {
+    /// Takes `yes` where the mask is set, else `no`.
+    #[must_use]
+    #[inline(always)]
+    pub fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
+        Self {
+            x: F64x8::pick(mask, yes.x, no.x),
+            y: F64x8::pick(mask, yes.y, no.y),
+            z: F64x8::pick(mask, yes.z, no.z),
+        }
+    }
+
+    /// Multiplies each as a vector by a matrix.
+    #[must_use]
+    #[inline(always)]
+    pub fn turned(self, by: &glam::DMat3) -> Self {
+        Self::splat(by.x_axis).scaled(self.x)
+            + Self::splat(by.y_axis).scaled(self.y)
+            + Self::splat(by.z_axis).scaled(self.z)
+    }
+
     /// Rounds to single precision.
     #[must_use]
     #[inline(always)]
@@ -401,6 +507,15 @@ mod tests {
         let count = I32x8::count_from(-3);
         assert_eq!(count.not_negative().0, [0, 0, 0, u32::MAX, u32::MAX, u32::MAX, u32::MAX, u32::MAX]);
         assert_eq!(count.to_f64().round().0[7], 4.0);
+        let wide = F32x8([1.0, -2.0, 3.5, 0.0, f32::NAN, 1e30, -0.0, 8.0]).to_f64();
+        let two = F64x8::splat(2.0);
+        assert_eq!(wide.above(two).0, a.above(b).0);
+        assert_eq!(F64x8::pick(wide.above(two), wide, two).round(), a.above(b).pick(a, b));
+        assert_eq!(wide.min(two).max(-two).0, [1.0, -2.0, 2.0, 0.0, 2.0, 2.0, 0.0, 2.0]);
+        assert_eq!((Mask8::first(3).count(), Mask8::ALL.count()), (3, 8));
+        let turn = glam::DMat3::from_rotation_z(0.3);
+        let turned = DVec3x8::splat(glam::DVec3::new(1.0, 2.0, 3.0)).turned(&turn);
+        assert_eq!(turned.get(5), turn * glam::DVec3::new(1.0, 2.0, 3.0));
         let v = Vec3x8::splat(glam::Vec3::new(2.0, 3.0, 6.0));
         assert_eq!(v.length(), F32x8::splat(7.0));
     }

@@ -6,7 +6,7 @@
 //! (Blinn-Phong, `H` between `L` and `V`). Source: J. F. Blinn, *Models of light reflection for computer
 //! synthesized pictures*, SIGGRAPH 1977.
 
-use crate::lanes::{F32x8, Vec3x8};
+use crate::lanes::{F32x8, LANES, Mask8, Vec3x8};
 use crate::scene::{Environment, LightingModel, Material};
 use glam::{DVec3, Vec3};
 
@@ -82,6 +82,30 @@ impl Surfaces<'_> {
         let sum = (diffuse + Vec3x8 { x: shine, y: shine, z: shine }) * radiance;
         Vec3x8::pick(facing.above(zero), sum, Vec3x8::splat(Vec3::ZERO))
     }
+}
+
+/// Lights eight points of any materials, see [`Surfaces::lit_by`]; those without a material stay black.
+#[must_use]
+#[inline(always)]
+pub fn lit_by_material(
+    mut materials: [Option<&Material>; LANES],
+    (color, normal, to_eye): (Vec3x8, Vec3x8, Vec3x8),
+    model: LightingModel,
+    to_light: Vec3x8,
+    radiance: Vec3x8,
+) -> Vec3x8 {
+    let mut sum = Vec3x8::splat(Vec3::ZERO);
+    while let Some(material) = materials.iter().flatten().next().copied() {
+        let lit = Surfaces { material, color, normal, to_eye }.lit_by(model, to_light, radiance);
+        let mut mask = Mask8::NONE;
+        for (lane, waits) in materials.iter_mut().enumerate() {
+            if waits.is_some_and(|m| std::ptr::eq(m, material)) {
+                (*waits, mask.0[lane]) = (None, u32::MAX);
+            }
+        }
+        sum = Vec3x8::pick(mask, lit, sum);
+    }
+    sum
 }
 
 /// Returns the cosine that the highlight is a power of; nothing but its sign counts where it is negative.

@@ -1,26 +1,40 @@
-//! Rays of one tile, and what they met.
+//! Rays of one tile, eight and eight, and what they met.
 
 use glam::DVec3;
+use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 
 /// Pixels along the edge of a tile.
 pub(crate) const TILE: u32 = 16;
-/// Rays in a tile.
-pub(crate) const TILE_RAYS: usize = (TILE * TILE) as usize;
+/// Groups of eight pixels along a row of a tile.
+pub(crate) const COLUMNS: usize = TILE as usize / LANES;
+/// Groups of eight rays in a tile.
+pub(crate) const OCTETS: usize = TILE as usize * COLUMNS;
 
-/// A ray with the stretch of it that is looked at; distances are in world units.
+/// Eight rays with the stretches of them that are looked at; distances are in world units. A ray whose far end
+/// is not beyond its near end is closed: it meets nothing.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stretch {
-    pub(crate) origin: DVec3,
-    pub(crate) direction: DVec3,
-    pub(crate) near: f64,
-    pub(crate) far: f64,
+pub(crate) struct Rays {
+    pub(crate) origin: DVec3x8,
+    /// Unit vectors.
+    pub(crate) direction: DVec3x8,
+    pub(crate) near: F64x8,
+    pub(crate) far: F64x8,
 }
 
-/// Up to [`TILE_RAYS`] rays that go about the same way.
-#[derive(Default)]
-pub(crate) struct Bundle {
-    pub(crate) rays: Vec<Stretch>,
+impl Rays {
+    #[inline(always)]
+    pub(crate) fn open(&self) -> Mask8 {
+        self.far.above(self.near)
+    }
+
+    /// Closes a ray.
+    pub(crate) fn close(&mut self, lane: usize) {
+        (self.near.0[lane], self.far.0[lane]) = (1.0, 0.0);
+    }
 }
+
+/// Eight vectors of no length.
+pub(crate) const NOWHERE: DVec3x8 = DVec3x8 { x: F64x8::ZERO, y: F64x8::ZERO, z: F64x8::ZERO };
 
 /// A cone around all rays of a bundle: whatever is outside is met by none of them.
 #[derive(Clone, Copy, Debug)]
@@ -32,24 +46,37 @@ pub(crate) struct Cone {
     tangent: f64,
 }
 
-impl Bundle {
-    /// Bounds the rays; nothing where they go apart by more than sixty degrees, or there are none.
-    pub(crate) fn cone(&self) -> Option<Cone> {
-        let count = self.rays.len() as f64;
-        let origin = self.rays.iter().map(|r| r.origin).sum::<DVec3>() / count;
-        let axis = self.rays.iter().map(|r| r.direction).sum::<DVec3>().try_normalize()?;
-        let spread = self.rays.iter().map(|r| r.origin.distance_squared(origin)).fold(0.0, f64::max).sqrt();
-        let cosine = self.rays.iter().map(|r| r.direction.dot(axis)).fold(1.0, f64::min);
+impl Cone {
+    /// Bounds the open rays; nothing where they go apart by more than sixty degrees, or there are none.
+    #[inline(always)]
+    pub(crate) fn around(rays: &[Rays]) -> Option<Self> {
+        let (mut origins, mut directions, mut count) = (NOWHERE, NOWHERE, 0);
+        for r in rays {
+            let open = r.open();
+            origins = origins + DVec3x8::pick(open, r.origin, NOWHERE);
+            directions = directions + DVec3x8::pick(open, r.direction, NOWHERE);
+            count += open.count();
+        }
+        let sum = |v: &DVec3x8| (0..LANES).map(|i| v.get(i)).sum::<DVec3>();
+        let origin = sum(&origins) / f64::from(count);
+        let axis = sum(&directions).try_normalize()?;
+        let (middle, along) = (DVec3x8::splat(origin), DVec3x8::splat(axis));
+        let (mut spread, mut cosine) = (F64x8::ZERO, F64x8::splat(1.0));
+        for r in rays {
+            let (open, offset) = (r.open(), r.origin - middle);
+            spread = F64x8::pick(open, spread.max(offset.dot(offset)), spread);
+            cosine = F64x8::pick(open, cosine.min(r.direction.dot(along)), cosine);
+        }
+        let spread = spread.0.into_iter().fold(0.0, f64::max).sqrt();
+        let cosine = cosine.0.into_iter().fold(1.0, f64::min);
         if cosine.is_nan() || cosine <= 0.5 {
             return None;
         }
         // A little wider than computed, against rounding.
         let tangent = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine * 1.001 + 1e-9;
-        Some(Cone { origin, spread: spread * 1.001, axis, tangent })
+        Some(Self { origin, spread: spread * 1.001, axis, tangent })
     }
-}
 
-impl Cone {
     /// Tells whether a sphere may be met.
     pub(crate) fn touches(&self, center: DVec3, radius: f64) -> bool {
         let offset = center - self.origin;
@@ -60,27 +87,49 @@ impl Cone {
     }
 }
 
-/// What the rays met first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Hit {
-    /// Distance in world units.
-    pub(crate) t: f64,
-    /// Index of the body, [`Hit::NOTHING`] for none.
-    pub(crate) body: u32,
-    /// Outward normal of a free form in its object space, not of unit length; zero for other bodies.
-    pub(crate) normal: DVec3,
+/// What eight rays met first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hits {
+    /// Distances in world units; the far ends where nothing is met.
+    pub(crate) t: F64x8,
+    /// Indices of the bodies, [`Hits::NOTHING`] for none.
+    pub(crate) body: Mask8,
+    /// Outward normals of free forms in their object space, not of unit length.
+    pub(crate) normal: DVec3x8,
 }
 
-impl Hit {
+impl Hits {
     pub(crate) const NOTHING: u32 = u32::MAX;
 
-    /// A ray that met nothing up to a distance.
-    pub(crate) fn nothing(far: f64) -> Self {
-        Self { t: far, body: Self::NOTHING, normal: DVec3::ZERO }
+    /// Rays that met nothing up to their far ends.
+    #[inline(always)]
+    pub(crate) fn nothing(rays: &Rays) -> Self {
+        Self { t: rays.far, body: Mask8([Self::NOTHING; LANES]), normal: NOWHERE }
     }
 
-    pub(crate) fn is_some(&self) -> bool {
-        self.body != Self::NOTHING
+    /// Tells which met something.
+    #[inline(always)]
+    pub(crate) fn any(&self) -> Mask8 {
+        !self.of(Self::NOTHING)
+    }
+
+    /// Tells which met a body.
+    #[inline(always)]
+    pub(crate) fn of(&self, body: u32) -> Mask8 {
+        let mut mask = Mask8::NONE;
+        for i in 0..LANES {
+            mask.0[i] = if self.body.0[i] == body { u32::MAX } else { 0 };
+        }
+        mask
+    }
+
+    /// Takes what was found where it is nearer.
+    #[inline(always)]
+    pub(crate) fn improve(&mut self, found: Mask8, t: F64x8, body: u32, normal: DVec3x8) {
+        let nearer = found & self.t.above(t);
+        self.t = F64x8::pick(nearer, t, self.t);
+        self.body = nearer.pick_bits(Mask8([body; LANES]), self.body);
+        self.normal = DVec3x8::pick(nearer, normal, self.normal);
     }
 }
 

@@ -1,19 +1,27 @@
 //! How do rays meet a free form?
 //!
-//! A tile's rays are bounded by a box for each of a few slices in depth. Slices where the bounds of the form do
-//! not hold zero are skipped; for the rest the program is pruned to what matters there, and the rays are searched
-//! in packets.
+//! The rays of a tile between two distances are held by a box. Where the bounds of the form over it do not hold
+//! zero, it is left out; else the program is pruned to what matters there, and the stretch is halved until it is
+//! about as long as the tile is wide. What is left is searched ray by ray, eight at once, the near part first,
+//! until every ray has met something.
 
-use crate::bundle::{Bundle, Crossing, Hit};
-use crate::program::{Active, Program, Step, value_and_gradient};
+use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
+use crate::program::{Active, Program, Step, values_and_gradients};
 use crate::roots::{RayQuadric, Stack, first_roots};
 use glam::{DAffine3, DVec3};
-use polyptych_core::lanes::{F32x8, LANES, Mask8};
+use polyptych_core::lanes::{DVec3x8, F64x8, Mask8};
 use polyptych_core::math::Aabb;
-use polyptych_core::scene::{FreeForm, Quadric};
+use polyptych_core::scene::FreeForm;
 
-/// Slices in depth. Four cost less than they save on any figure with a dozen functions; more do not pay.
-const SLICES: u32 = 4;
+/// How often a stretch is halved at most.
+const LEVELS: usize = 6;
+
+/// By how much of their length the halves of a stretch overlap, so that a root on the border, which rounding may
+/// put on either side, is inside of one.
+const OVERLAP: f64 = 1e-4;
+
+/// A stretch is halved while it is so much longer than the tile is wide.
+const SLENDER: f64 = 3.0;
 
 /// A free form, ready to be cast.
 #[derive(Debug)]
@@ -26,21 +34,30 @@ pub(crate) struct FormBody {
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(crate) struct FormScratch {
-    active: Active,
+    /// What matters at each level of halving.
+    active: [Active; LEVELS],
     leaves: Vec<RayQuadric>,
     stack: Stack,
-    values: Vec<(f64, DVec3)>,
+    values: Vec<(F64x8, DVec3x8)>,
     alive: Vec<Alive>,
 }
 
-/// A ray in object space that meets the bounds; `t` stays the distance in the world.
+/// Rays in object space that meet the bounds; distances stay those of the world.
 #[derive(Clone, Copy)]
 struct Alive {
-    ray: usize,
-    origin: DVec3,
-    direction: DVec3,
-    near: f64,
-    far: f64,
+    octet: usize,
+    origin: DVec3x8,
+    direction: DVec3x8,
+    near: F64x8,
+    far: F64x8,
+    /// Those that have met nothing yet.
+    open: Mask8,
+}
+
+/// Bounds of all rays of a tile.
+struct Pyramid {
+    origins: Aabb,
+    directions: Aabb,
 }
 
 impl FormBody {
@@ -53,184 +70,16 @@ impl FormBody {
         (self.program.steps.len() * 24 + self.program.leaves.len() * 80) as u64
     }
 
-    /// Improves `hits` where a ray of the bundle meets the form sooner.
+    /// Improves `hits` where a ray meets the form sooner.
     pub(crate) fn cast(
         &self,
         object_from_world: &DAffine3,
         body: u32,
         crossing: Crossing,
-        bundle: &Bundle,
-        hits: &mut [Hit],
+        rays: &[Rays],
+        hits: &mut [Hits],
         scratch: &mut FormScratch,
     ) {
-        self.enter(object_from_world, bundle, hits, &mut scratch.alive);
-        let Some((near, far)) = self.slice(scratch) else { return };
-        let zero = RayQuadric { a: F32x8::ZERO, b: F32x8::ZERO, c: F32x8::ZERO, error: F32x8::ZERO };
-        if scratch.leaves.len() < self.program.leaves.len() {
-            scratch.leaves.resize(self.program.leaves.len(), zero);
-        }
-        let FormScratch { active, leaves, stack, alive, values } = scratch;
-        let center = self.bounds.center();
-        for packet in alive.chunks(LANES) {
-            let rays = RayPacket::new(packet, center, near, far);
-            for &step in &active.steps {
-                if let Step::Leaf(leaf) = step {
-                    leaves[leaf as usize] = rays.quadric(&self.program.leaves[leaf as usize]);
-                }
-            }
-            let (from, to) = rays.stretch();
-            let (found, root) = first_roots(&active.steps, leaves, from, to, rays.open, crossing, stack);
-            for (i, alive) in packet.iter().enumerate() {
-                if !found.has(i) {
-                    continue;
-                }
-                let t = rays.around[i] + f64::from(root.0[i]);
-                let (t, normal) = match crossing {
-                    Crossing::Any => self.polish(alive, t, &active.steps, values),
-                    // What blocks light is not looked at.
-                    Crossing::Entry => (t, DVec3::ZERO),
-                };
-                if t < hits[alive.ray].t {
-                    hits[alive.ray] = Hit { t, body, normal };
-                }
-            }
-        }
-    }
-
-    /// Lists the rays that meet the bounds before what they met already.
-    fn enter(&self, object_from_world: &DAffine3, bundle: &Bundle, hits: &[Hit], alive: &mut Vec<Alive>) {
-        alive.clear();
-        for (ray, stretch) in bundle.rays.iter().enumerate() {
-            let origin = object_from_world.transform_point3(stretch.origin);
-            let direction = object_from_world.transform_vector3(stretch.direction);
-            if let Some((near, far)) = self.bounds.clip(origin, direction) {
-                let (near, far) = (near.max(stretch.near), far.min(stretch.far).min(hits[ray].t));
-                if near < far {
-                    alive.push(Alive { ray, origin, direction, near, far });
-                }
-            }
-        }
-    }
-
-    /// Finds the range of distances in which any ray may meet the form, and prunes the program to it.
-    fn slice(&self, scratch: &mut FormScratch) -> Option<(f64, f64)> {
-        let alive = &scratch.alive;
-        let origins = Aabb::of_points(alive.iter().map(|a| a.origin));
-        let directions = Aabb::of_points(alive.iter().map(|a| a.direction));
-        let near = alive.iter().map(|a| a.near).fold(f64::INFINITY, f64::min);
-        let far = alive.iter().map(|a| a.far).fold(0.0, f64::max);
-        if origins.is_empty() || near >= far {
-            return None;
-        }
-        let reached = |a: f64, b: f64| {
-            let ends = [directions.min * a, directions.min * b, directions.max * a, directions.max * b];
-            let low = ends.iter().fold(DVec3::INFINITY, |m, e| m.min(*e));
-            let high = ends.iter().fold(DVec3::NEG_INFINITY, |m, e| m.max(*e));
-            Aabb::new(origins.min + low, origins.max + high).intersection(self.bounds)
-        };
-        let mut range: Option<(f64, f64)> = None;
-        let step = (far - near) / f64::from(SLICES);
-        for i in 0..SLICES {
-            let (a, b) = (near + step * f64::from(i), near + step * f64::from(i + 1));
-            let part = reached(a, b);
-            if part.is_empty() {
-                continue;
-            }
-            let bounds = scratch.active.prune(&self.program, &self.program.steps, &part);
-            if bounds.contains(0.0) {
-                range = Some((range.map_or(a, |r| r.0), b));
-            }
-        }
-        let (a, b) = range?;
-        scratch.active.prune(&self.program, &self.program.steps, &reached(a, b));
-        Some((a, b))
-    }
-
-    /// Improves a distance along a ray by a step of Newton's method in double precision and returns it with the
-    /// outward normal, in object space.
-    fn polish(&self, ray: &Alive, t: f64, steps: &[Step], values: &mut Vec<(f64, DVec3)>) -> (f64, DVec3) {
-        let p = ray.origin + ray.direction * t;
-        let (value, gradient) = value_and_gradient(&self.program, steps, p, values);
-        let step = value / gradient.dot(ray.direction);
-        // Near a tangent or a crease a step may lead away: single precision was right to 1e-5 of the size.
-        let small = step.is_finite() && step.abs() * ray.direction.length() < self.bounds.radius() * 1e-4;
-        (if small { t - step } else { t }, -gradient)
-    }
-}
-
-/// Eight rays in double precision, one array for each number.
-pub(crate) struct RayPacket {
-    /// Points around which polynomials are taken.
-    points: [[f64; LANES]; 3],
-    directions: [[f64; LANES]; 3],
-    /// Distances of those points.
-    around: [f64; LANES],
-    from: [f64; LANES],
-    to: [f64; LANES],
-    /// How far from the points the polynomials are looked at.
-    reach: [f64; LANES],
-    open: Mask8,
-}
-
-impl RayPacket {
-    /// Gathers up to eight rays between two distances; lanes beyond the last repeat it and are closed.
-    #[inline]
-    fn new(packet: &[Alive], center: DVec3, near: f64, far: f64) -> Self {
-        let mut out = Self::EMPTY;
-        for i in 0..LANES {
-            let ray = &packet[i.min(packet.len() - 1)];
-            let (near, far) = (ray.near.max(near), ray.far.min(far));
-            // Around the point nearest to the form's middle the polynomials have small coefficients.
-            let nearest = (center - ray.origin).dot(ray.direction) / ray.direction.length_squared();
-            let around = nearest.max(near).min(far);
-            out.set(i, ray.origin, ray.direction, around, near - around, far - around);
-            out.open.0[i] = if i < packet.len() && near <= far { u32::MAX } else { 0 };
-        }
-        out
-    }
-
-    const EMPTY: Self = Self {
-        points: [[0.0; LANES]; 3],
-        directions: [[0.0; LANES]; 3],
-        around: [0.0; LANES],
-        from: [0.0; LANES],
-        to: [0.0; LANES],
-        reach: [0.0; LANES],
-        open: Mask8::NONE,
-    };
-
-    #[inline]
-    fn set(&mut self, i: usize, origin: DVec3, direction: DVec3, around: f64, from: f64, to: f64) {
-        let p = origin + direction * around;
-        for a in 0..3 {
-            self.points[a][i] = p[a];
-            self.directions[a][i] = direction[a];
-        }
-        (self.around[i], self.from[i], self.to[i]) = (around, from, to);
-        self.reach[i] = from.abs().max(to.abs());
-    }
-
-    /// Gathers rays that are looked at up to `reach` around one distance.
-    #[cfg(test)]
-    pub(crate) fn around(rays: &[(DVec3, DVec3); LANES], around: f64, reach: f64) -> Self {
-        let mut out = Self::EMPTY;
-        for (i, &(origin, direction)) in rays.iter().enumerate() {
-            out.set(i, origin, direction, around, -reach, reach);
-        }
-        out
-    }
-
-    fn stretch(&self) -> (F32x8, F32x8) {
-        let (mut from, mut to) = (F32x8::ZERO, F32x8::ZERO);
-        for i in 0..LANES {
-            (from.0[i], to.0[i]) = (self.from[i] as f32, self.to[i] as f32);
-        }
-        (from, to)
-    }
-
-    /// Returns a quadric along the rays, as polynomials in the distance from their points, with bounds on the
-    /// rounding error of evaluating them.
-    pub(crate) fn quadric(&self, q: &Quadric) -> RayQuadric {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             #[expect(
@@ -238,37 +87,342 @@ impl RayPacket {
                 reason = "a kernel compiled for a processor feature can only be called so"
             )]
             // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.quadric_avx2(q) };
+            return unsafe { self.cast_avx2(object_from_world, body, crossing, rays, hits, scratch) };
         }
-        self.quadric_along(q)
+        self.cast_plain(object_from_world, body, crossing, rays, hits, scratch);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn quadric_avx2(&self, q: &Quadric) -> RayQuadric {
-        self.quadric_along(q)
+    fn cast_avx2(
+        &self,
+        object_from_world: &DAffine3,
+        body: u32,
+        crossing: Crossing,
+        rays: &[Rays],
+        hits: &mut [Hits],
+        scratch: &mut FormScratch,
+    ) {
+        self.cast_plain(object_from_world, body, crossing, rays, hits, scratch);
     }
 
     #[inline(always)]
-    fn quadric_along(&self, q: &Quadric) -> RayQuadric {
-        let [qa, qb, qc, qd, qe, qf, qg, qh, qi, qk] = q.0;
-        let mut out = RayQuadric { a: F32x8::ZERO, b: F32x8::ZERO, c: F32x8::ZERO, error: F32x8::ZERO };
-        let ([px, py, pz], [dx, dy, dz]) = (&self.points, &self.directions);
-        for i in 0..LANES {
-            let (x, y, z, u, v, w) = (px[i], py[i], pz[i], dx[i], dy[i], dz[i]);
-            let a = u * (qa * u + qd * v + qe * w) + v * (qb * v + qf * w) + qc * w * w;
-            let b = (2.0 * qa * x + qd * y + qe * z + qg) * u
-                + (2.0 * qb * y + qd * x + qf * z + qh) * v
-                + (2.0 * qc * z + qe * x + qf * y + qi) * w;
-            let c = x * (qa * x + qd * y + qe * z + qg) + y * (qb * y + qf * z + qh) + z * (qc * z + qi) + qk;
-            // Three roundings of single precision on each term, doubled.
-            let reach = self.reach[i];
-            let error = (a.abs() * reach * reach + b.abs() * reach + c.abs()) * 6.0 * f64::from(f32::EPSILON);
-            out.a.0[i] = a as f32;
-            out.b.0[i] = b as f32;
-            out.c.0[i] = c as f32;
-            out.error.0[i] = error as f32;
+    fn cast_plain(
+        &self,
+        object_from_world: &DAffine3,
+        body: u32,
+        crossing: Crossing,
+        rays: &[Rays],
+        hits: &mut [Hits],
+        scratch: &mut FormScratch,
+    ) {
+        self.enter(object_from_world, rays, hits, &mut scratch.alive);
+        let Some((pyramid, near, far)) = bound(&scratch.alive) else { return };
+        scratch.leaves.resize(self.program.leaves.len(), RayQuadric::ZERO);
+        let mut waiting = [(0.0, 0.0, 0); LEVELS + 1];
+        waiting[0] = (near, far, 0);
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (begin, end, level) = waiting[count];
+            let part = pyramid.between(begin, end).intersection(self.bounds);
+            if part.is_empty() {
+                continue;
+            }
+            let (above, below) = scratch.active.split_at_mut(level);
+            let from = above.last().map_or(&self.program.steps, |a| &a.steps);
+            if !below[0].prune(&self.program, from, &part).contains(0.0) {
+                continue;
+            }
+            if level + 1 < LEVELS && below[0].steps.len() > 1 && pyramid.is_slender(begin, end) {
+                let (middle, overlap) = (0.5 * (begin + end), OVERLAP * (end - begin));
+                waiting[count] = (middle - overlap, end, level + 1);
+                waiting[count + 1] = (begin, middle + overlap, level + 1);
+                count += 2;
+            } else if !self.search((begin, end), level, body, crossing, hits, scratch) {
+                return;
+            }
         }
-        out
+    }
+
+    /// Lists the rays that meet the bounds before what they met already.
+    #[inline(always)]
+    fn enter(&self, object_from_world: &DAffine3, rays: &[Rays], hits: &[Hits], alive: &mut Vec<Alive>) {
+        alive.clear();
+        let shift = DVec3x8::splat(object_from_world.translation);
+        for (octet, (r, hits)) in rays.iter().zip(hits).enumerate() {
+            let open = r.open();
+            if !open.any() {
+                continue;
+            }
+            let origin = r.origin.turned(&object_from_world.matrix3) + shift;
+            let direction = r.direction.turned(&object_from_world.matrix3);
+            let (enter, leave) = clip(&self.bounds, &origin, &direction);
+            let (near, far) = (enter.max(r.near), leave.min(r.far).min(hits.t));
+            let open = open & far.above(near);
+            if open.any() {
+                alive.push(Alive { octet, origin, direction, near, far, open });
+            }
+        }
+    }
+
+    /// Searches all rays between two distances; tells whether some are still open.
+    #[inline(always)]
+    fn search(
+        &self,
+        (begin, end): (f64, f64),
+        level: usize,
+        body: u32,
+        crossing: Crossing,
+        hits: &mut [Hits],
+        scratch: &mut FormScratch,
+    ) -> bool {
+        let FormScratch { active, leaves, stack, alive, values } = scratch;
+        let steps = &active[level].steps;
+        let mut left = false;
+        for alive in alive {
+            let (from, to) = (alive.near.max(F64x8::splat(begin)), alive.far.min(F64x8::splat(end)));
+            let open = alive.open & to.above(from);
+            left |= alive.open.any();
+            if !open.any() {
+                continue;
+            }
+            let half = F64x8::splat(0.5);
+            let (around, reach) = ((from + to) * half, (to - from) * half);
+            let rays =
+                Line { point: alive.origin + alive.direction.scaled(around), direction: alive.direction };
+            let (found, t) = if let [Step::Leaf(leaf)] = **steps {
+                let along = rays.quadric(&self.program.leaves[leaf as usize].0);
+                let (found, root) = along.first_root(reach, crossing);
+                (found & open, around + root)
+            } else {
+                for step in steps {
+                    if let Step::Leaf(leaf) | Step::Bump { leaf, .. } = *step {
+                        let along = rays.quadric(&self.program.leaves[leaf as usize].0);
+                        leaves[leaf as usize] = RayQuadric::new(&along, reach);
+                    }
+                }
+                let reach = reach.round();
+                let (found, root) = first_roots(steps, leaves, -reach, reach, open, crossing, stack);
+                (found, around + root.to_f64())
+            };
+            if !found.any() {
+                continue;
+            }
+            let (t, normal) = match crossing {
+                Crossing::Any => self.polish(alive, t, steps, values),
+                // What blocks light is not looked at.
+                Crossing::Entry => (t, NOWHERE),
+            };
+            hits[alive.octet].improve(found, t, body, normal);
+            alive.open = alive.open & !found;
+        }
+        left
+    }
+
+    /// Improves distances along rays by a step of Newton's method in double precision and returns them with the
+    /// outward normals, in object space.
+    #[inline(always)]
+    fn polish(
+        &self,
+        rays: &Alive,
+        t: F64x8,
+        steps: &[Step],
+        values: &mut Vec<(F64x8, DVec3x8)>,
+    ) -> (F64x8, DVec3x8) {
+        let p = rays.origin + rays.direction.scaled(t);
+        let (value, gradient) = values_and_gradients(&self.program, steps, p, values);
+        let step = value / gradient.dot(rays.direction);
+        // Near a tangent or a crease a step may lead away: single precision was right to 1e-5 of the size.
+        let small = F64x8::splat(self.bounds.radius() * 1e-4).above((step * rays.direction.length()).abs());
+        (F64x8::pick(small, t - step, t), NOWHERE - gradient)
+    }
+}
+
+/// Returns where rays enter and leave a box, as [`Aabb::clip`]; rays in a face plane are inside.
+#[inline(always)]
+fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) {
+    let infinity = F64x8::splat(f64::INFINITY);
+    let (mut near, mut far) = (F64x8::ZERO, infinity);
+    let axes = [
+        (origin.x, direction.x, bounds.min.x, bounds.max.x),
+        (origin.y, direction.y, bounds.min.y, bounds.max.y),
+        (origin.z, direction.z, bounds.min.z, bounds.max.z),
+    ];
+    for (o, d, min, max) in axes {
+        let (min, max) = (F64x8::splat(min) - o, F64x8::splat(max) - o);
+        let (a, b) = (min / d, max / d);
+        let flat = d.equal(F64x8::ZERO);
+        let outside = flat & (min.above(F64x8::ZERO) | F64x8::ZERO.above(max));
+        let (low, high) = (a.min(b), a.max(b));
+        near = F64x8::pick(flat, near, near.max(low));
+        far = F64x8::pick(outside, -infinity, F64x8::pick(flat, far, far.min(high)));
+    }
+    (near, far)
+}
+
+/// Bounds all open rays, with the range of their distances; nothing if there are none.
+#[inline(always)]
+fn bound(alive: &[Alive]) -> Option<(Pyramid, f64, f64)> {
+    let (top, bottom) = (F64x8::splat(f64::INFINITY), F64x8::splat(f64::NEG_INFINITY));
+    let (mut low, mut high) = ([top; 7], [bottom; 7]);
+    for a in alive {
+        let numbers = [a.origin.x, a.origin.y, a.origin.z, a.direction.x, a.direction.y, a.direction.z];
+        for (i, v) in numbers.into_iter().enumerate() {
+            low[i] = low[i].min(F64x8::pick(a.open, v, top));
+            high[i] = high[i].max(F64x8::pick(a.open, v, bottom));
+        }
+        low[6] = low[6].min(F64x8::pick(a.open, a.near, top));
+        high[6] = high[6].max(F64x8::pick(a.open, a.far, bottom));
+    }
+    let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
+    let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));
+    let boxed = |i: usize| {
+        Aabb::new(DVec3::new(low[i], low[i + 1], low[i + 2]), DVec3::new(high[i], high[i + 1], high[i + 2]))
+    };
+    (low[6] < high[6]).then(|| (Pyramid { origins: boxed(0), directions: boxed(3) }, low[6], high[6]))
+}
+
+impl Pyramid {
+    /// Bounds the places of all rays between two distances.
+    fn between(&self, a: f64, b: f64) -> Aabb {
+        let (d, o) = (&self.directions, &self.origins);
+        let (low, high) = ((d.min * a).min(d.min * b), (d.max * a).max(d.max * b));
+        Aabb::new(o.min + low, o.max + high)
+    }
+
+    /// Tells whether the rays between two distances are much longer than all of them together are wide.
+    fn is_slender(&self, a: f64, b: f64) -> bool {
+        let wide = (self.origins.size() + self.directions.size() * b).max_element();
+        self.directions.center().length() * (b - a) > SLENDER * wide
+    }
+}
+
+/// Eight rays around points on them.
+struct Line {
+    point: DVec3x8,
+    direction: DVec3x8,
+}
+
+/// A quadric along eight rays: `a u^2 + b u + c`.
+pub(crate) struct Parabola {
+    pub(crate) a: F64x8,
+    pub(crate) b: F64x8,
+    pub(crate) c: F64x8,
+}
+
+impl Line {
+    /// Returns a quadric along the rays, as polynomials in the distance from their points.
+    #[inline(always)]
+    fn quadric(&self, q: &[f64; 10]) -> Parabola {
+        let [qa, qb, qc, qd, qe, qf, qg, qh, qi, qk] = q.map(F64x8::splat);
+        let DVec3x8 { x, y, z } = self.point;
+        let DVec3x8 { x: u, y: v, z: w } = self.direction;
+        let (ax, by, cz) = (qa * x, qb * y, qc * z);
+        let (dx, dy, ex, ez, fy, fz) = (qd * x, qd * y, qe * x, qe * z, qf * y, qf * z);
+        Parabola {
+            a: u * (qa * u + qd * v + qe * w) + v * (qb * v + qf * w) + qc * w * w,
+            b: (ax + ax + dy + ez + qg) * u + (by + by + dx + fz + qh) * v + (cz + cz + ex + fy + qi) * w,
+            c: x * (ax + dy + ez + qg) + y * (by + fz + qh) + z * (cz + qi) + qk,
+        }
+    }
+}
+
+impl Parabola {
+    /// Finds the first roots in `[-reach, reach]`, in closed form: without cancellation, as in *Numerical
+    /// Recipes* 5.6.
+    #[inline(always)]
+    fn first_root(&self, reach: F64x8, crossing: Crossing) -> (Mask8, F64x8) {
+        let Self { a, b, c } = *self;
+        let under = b * b - F64x8::splat(4.0) * a * c;
+        let root = under.max(F64x8::ZERO).sqrt();
+        let half = F64x8::splat(-0.5);
+        let q = F64x8::pick(b.at_least(F64x8::ZERO), half * (b + root), half * (b - root));
+        let (r, s) = (q / a, c / q);
+        // Of a line only one root is a number.
+        let infinity = F64x8::splat(f64::INFINITY);
+        let r = F64x8::pick(infinity.above(r.abs()), r, s);
+        let s = F64x8::pick(infinity.above(s.abs()), s, r);
+        let (low, high) = (r.min(s), r.max(s));
+        let counts = |t: F64x8| {
+            let within = reach.at_least(t.abs()) & under.above(F64x8::ZERO);
+            match crossing {
+                Crossing::Any => within,
+                Crossing::Entry => within & ((a + a) * t + b).above(F64x8::ZERO),
+            }
+        };
+        let (first, second) = (counts(low), counts(high));
+        (first | second, F64x8::pick(first, low, high))
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use polyptych_core::lanes::LANES;
+
+    /// Returns quadrics along rays, looked at up to `reach` around one distance.
+    pub(crate) fn along(
+        program: &Program,
+        rays: &[(DVec3, DVec3); LANES],
+        around: f64,
+        reach: f64,
+    ) -> Vec<RayQuadric> {
+        let (mut point, mut direction) = (NOWHERE, NOWHERE);
+        for (i, &(o, d)) in rays.iter().enumerate() {
+            point.set(i, o + d * around);
+            direction.set(i, d);
+        }
+        let line = Line { point, direction };
+        let reach = F64x8::splat(reach);
+        program.leaves.iter().map(|q| RayQuadric::new(&line.quadric(&q.0), reach)).collect()
+    }
+
+    #[test]
+    fn parabolas_have_their_first_roots() {
+        let cases: [(f64, f64, f64, Option<f64>, Option<f64>); LANES] = [
+            (-1.0, 0.0, 1.0, Some(-1.0), Some(-1.0)),
+            (1.0, 0.0, -1.0, Some(-1.0), Some(1.0)),
+            (0.0, 2.0, 1.0, Some(-0.5), Some(-0.5)),
+            (0.0, -2.0, 1.0, Some(0.5), None),
+            (1.0, 0.0, 1.0, None, None),
+            (-1.0, 6.0, -5.0, Some(1.0), Some(1.0)),
+            (1.0, -6.0, 5.0, Some(1.0), None),
+            (0.0, 0.0, 1.0, None, None),
+        ];
+        let of = |pick: &dyn Fn(usize) -> f64| F64x8(std::array::from_fn(pick));
+        let parabola = Parabola { a: of(&|i| cases[i].0), b: of(&|i| cases[i].1), c: of(&|i| cases[i].2) };
+        for (crossing, entry) in [(Crossing::Any, false), (Crossing::Entry, true)] {
+            let (found, root) = parabola.first_root(F64x8::splat(2.0), crossing);
+            for (i, case) in cases.iter().enumerate() {
+                let truth = if entry { case.4 } else { case.3 };
+                assert_eq!(found.has(i).then_some(root.0[i]), truth, "{i} {crossing:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn eight_rays_are_clipped_as_one() {
+        let bounds = Aabb::new(DVec3::new(-1.0, 0.0, 2.0), DVec3::new(1.0, 3.0, 5.0));
+        let rays: [(DVec3, DVec3); LANES] = [
+            (DVec3::ZERO, DVec3::Z),
+            (DVec3::new(2.0, 0.0, 0.0), DVec3::Z),
+            (DVec3::new(1.0, 1.0, 0.0), DVec3::Z),
+            (DVec3::new(0.0, 1.0, 3.0), DVec3::new(0.6, 0.0, -0.8)),
+            (DVec3::new(-5.0, 1.0, 3.0), DVec3::X),
+            (DVec3::new(-5.0, 1.0, 3.0), DVec3::NEG_X),
+            (DVec3::new(-3.0, -3.0, 0.0), DVec3::splat(0.577)),
+            (DVec3::new(0.0, 9.0, 3.0), DVec3::new(0.1, -1.0, 0.05)),
+        ];
+        let (mut origin, mut direction) = (NOWHERE, NOWHERE);
+        for (i, &(o, d)) in rays.iter().enumerate() {
+            origin.set(i, o);
+            direction.set(i, d);
+        }
+        let (near, far) = clip(&bounds, &origin, &direction);
+        for (i, &(o, d)) in rays.iter().enumerate() {
+            let many = (near.0[i] <= far.0[i]).then_some((near.0[i], far.0[i]));
+            assert_eq!(many, bounds.clip(o, d), "{i}");
+        }
     }
 }

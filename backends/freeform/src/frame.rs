@@ -1,16 +1,18 @@
 //! A picture, tile by tile: what is met first, then what is seen through, then the light on it.
 
-use crate::bundle::{Bundle, Crossing, Hit, Stretch, TILE, TILE_RAYS};
+use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, TILE};
 use crate::form::FormScratch;
+use crate::light::{Illumination, Lit};
 use crate::volume::{Gathered, March, OPAQUE, Shine};
-use crate::world::{Geometry, Point, World};
+use crate::world::{Body, Geometry, World};
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::View;
-use polyptych_core::framebuffer::{Band, Channel, Channels, Pixel};
+use polyptych_core::framebuffer::{Band, Channel, Channels};
+use polyptych_core::lanes::{F32x8, F64x8, LANES, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
-use polyptych_core::scene::{Arriving, Shape};
+use polyptych_core::scene::Shape;
 use polyptych_core::seam::Control;
-use polyptych_core::shade::{Surface, facing, fogged, turned_away};
+use polyptych_core::shade::{facing, fogged};
 
 /// How to draw.
 #[derive(Clone, Copy, Debug)]
@@ -23,44 +25,19 @@ pub(crate) struct Options {
 /// Scratch memory for one band.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    primary: Bundle,
-    /// Which pixel of the tile each primary ray belongs to.
-    places: Vec<u32>,
-    opaque: Vec<Hit>,
-    layer: Vec<Hit>,
-    layer_rays: Bundle,
-    gathered: Vec<Gathered>,
-    pixels: Vec<Pixel>,
-    lit: Lighting,
+    rays: Vec<Rays>,
+    opaque: Vec<Hits>,
+    /// Rays that are followed through see-through surfaces, and what they met last.
+    through: Vec<Rays>,
+    layer: Vec<Hits>,
+    gathered: Vec<[Gathered; LANES]>,
+    pixels: Vec<Pixels>,
+    /// Bodies that the rays of the tile may meet.
+    bodies: Vec<u32>,
+    light: crate::light::Scratch,
     form: FormScratch,
     shines: Vec<Shine>,
-    pub(crate) rays: u64,
-}
-
-/// Light on the points of one layer.
-#[derive(Default)]
-struct Lighting {
-    /// Light and normals of each ray's point.
-    shaded: Vec<Shaded>,
-    shadow_rays: Bundle,
-    shadow_of: Vec<u32>,
-    /// What would arrive along each shadow ray.
-    arriving: Vec<Arriving>,
-    blocked: Vec<Hit>,
-}
-
-#[derive(Clone, Copy)]
-struct Shaded {
-    color: Vec3,
-    albedo: Vec3,
-    normal: DVec3,
-    true_normal: DVec3,
-    position: DVec3,
-    t: f64,
-    opacity: f32,
-    /// Lights that cast and arrive, and those of them that are blocked.
-    casting: u32,
-    dark: u32,
+    pub(crate) traced: u64,
 }
 
 /// What one frame is drawn with.
@@ -74,120 +51,176 @@ pub(crate) struct FrameDrawing<'a> {
 impl FrameDrawing<'_> {
     /// Draws a band, tile by tile; stops between tiles when the host wants to.
     pub(crate) fn band(&self, mut band: Band<'_>, scratch: &mut Scratch, control: &Control<'_>) {
-        scratch.rays = 0;
+        scratch.traced = 0;
+        let mut lit = [Lit::NOTHING; OCTETS];
         for first in (0..band.width).step_by(TILE as usize) {
             if control.is_cancelled() {
                 return;
             }
-            self.tile(&mut band, first, scratch);
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                #[expect(
+                    unsafe_code,
+                    reason = "a kernel compiled for a processor feature can only be called so"
+                )]
+                // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+                unsafe {
+                    self.tile_avx2(&mut band, first, &mut lit, scratch);
+                }
+                continue;
+            }
+            self.tile(&mut band, first, &mut lit, scratch);
         }
         control.finished(&band);
     }
 
-    fn tile(&self, band: &mut Band<'_>, first: u32, scratch: &mut Scratch) {
-        let columns = TILE.min(band.width - first);
-        self.aim(band, first, columns, scratch);
-        self.nearest(|body| !body.see_through, &scratch.primary, &mut scratch.opaque, &mut scratch.form);
-        scratch.gathered.clear();
-        scratch.gathered.resize(scratch.primary.rays.len(), Gathered::NOTHING);
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn tile_avx2<'a>(
+        &'a self,
+        band: &mut Band<'_>,
+        first: u32,
+        lit: &mut [Lit<'a>; OCTETS],
+        scratch: &mut Scratch,
+    ) {
+        self.tile(band, first, lit, scratch);
+    }
+
+    #[inline(always)]
+    fn tile<'a>(
+        &'a self,
+        band: &mut Band<'_>,
+        first: u32,
+        lit: &mut [Lit<'a>; OCTETS],
+        scratch: &mut Scratch,
+    ) {
+        self.aim(band, first, scratch);
+        let cone = Cone::around(&scratch.rays);
+        let touched = |body: &Body| cone.is_none_or(|c| c.touches(body.center, body.radius));
+        let bodies = self.world.bodies.iter().enumerate().filter(|(_, b)| touched(b)).map(|(i, _)| i as u32);
+        scratch.bodies.clear();
+        scratch.bodies.extend(bodies);
+        scratch.opaque.clear();
+        scratch.opaque.extend(scratch.rays.iter().map(Hits::nothing));
+        let has = |wanted: fn(&Body) -> bool| {
+            scratch.bodies.iter().any(|&i| wanted(&self.world.bodies[i as usize]))
+        };
+        let (layered, volumes) = (has(|b| b.see_through && !b.is_volume()), has(Body::is_volume));
+        self.nearest(
+            |b| !b.see_through,
+            &scratch.bodies,
+            &scratch.rays,
+            &mut scratch.opaque,
+            &mut scratch.form,
+        );
         scratch.pixels.clear();
-        scratch.pixels.resize(TILE_RAYS, Pixel::background(Vec3::ZERO));
-        self.look_through(scratch);
-        self.finish(scratch);
-        for row in 0..band.rows {
-            for x in 0..columns {
-                band.put(first + x, row, &scratch.pixels[(row * TILE + x) as usize]);
+        scratch.pixels.resize(OCTETS, Pixels::NOTHING);
+        let through = layered || volumes;
+        if through {
+            scratch.gathered.clear();
+            scratch.gathered.resize(OCTETS, [Gathered::NOTHING; LANES]);
+            self.look_through(layered, volumes, lit, scratch);
+        }
+        self.finish(through, lit, scratch);
+        for (octet, pixels) in scratch.pixels.iter().enumerate() {
+            let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
+            if row < band.rows && column < band.width {
+                pixels.put(band, column, row);
             }
         }
     }
 
     /// Sets up the rays through the middles of the pixels.
-    fn aim(&self, band: &Band<'_>, first: u32, columns: u32, scratch: &mut Scratch) {
-        scratch.primary.rays.clear();
-        scratch.places.clear();
-        for row in 0..band.rows {
-            for x in 0..columns {
-                let place = (f64::from(first + x) + 0.5, f64::from(band.first_row + row) + 0.5);
-                if let Some(ray) = self.view.ray(place.0, place.1) {
-                    let (origin, direction) = (ray.origin, ray.direction);
-                    scratch.primary.rays.push(Stretch { origin, direction, near: 0.0, far: f64::INFINITY });
-                    scratch.places.push(row * TILE + x);
-                }
-            }
+    #[inline(always)]
+    fn aim(&self, band: &Band<'_>, first: u32, scratch: &mut Scratch) {
+        scratch.rays.clear();
+        for octet in 0..OCTETS {
+            let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
+            let mut x = F64x8::ZERO;
+            (0..LANES).for_each(|i| x.0[i] = f64::from(column + i as u32) + 0.5);
+            let (origin, direction, there) = self.view.rays(x, f64::from(band.first_row + row) + 0.5);
+            let left = band.width.saturating_sub(column) as usize;
+            let there = there & Mask8::first(if row < band.rows { left } else { 0 });
+            let far = F64x8::pick(there, F64x8::splat(f64::INFINITY), F64x8::splat(-1.0));
+            scratch.rays.push(Rays { origin, direction, near: F64x8::ZERO, far });
+            scratch.traced += u64::from(there.count());
         }
-        scratch.rays += scratch.primary.rays.len() as u64;
     }
 
-    /// Finds what each ray meets first among some bodies.
+    /// Finds what each ray meets first among some bodies, or nothing nearer than before.
+    #[inline(always)]
     fn nearest(
         &self,
-        wanted: impl Fn(&crate::world::Body) -> bool,
-        bundle: &Bundle,
-        hits: &mut Vec<Hit>,
+        wanted: impl Fn(&Body) -> bool,
+        bodies: &[u32],
+        rays: &[Rays],
+        hits: &mut [Hits],
         form: &mut FormScratch,
     ) {
-        hits.clear();
-        hits.extend(bundle.rays.iter().map(|r| Hit::nothing(r.far)));
-        let cone = bundle.cone();
-        for (index, body) in self.world.bodies.iter().enumerate() {
-            if wanted(body) && cone.is_none_or(|c| c.touches(body.center, body.radius)) {
-                body.cast(index as u32, Crossing::Any, bundle, hits, form);
+        for &index in bodies {
+            let body = &self.world.bodies[index as usize];
+            if wanted(body) {
+                body.cast(index, Crossing::Any, rays, hits, form);
             }
         }
+    }
+
+    fn illumination(&self) -> Illumination<'_> {
+        let wanted = self.channels.has(Channel::Color) || self.channels.has(Channel::Shadow);
+        Illumination { world: self.world, shadows: self.options.shadows, wanted }
     }
 
     /// Gathers see-through surfaces and volumes in front of the opaque ones, layer by layer.
-    fn look_through(&self, scratch: &mut Scratch) {
-        // Most scenes have nothing of the kind: no cone is needed to tell.
-        if !self.world.bodies.iter().any(|b| b.see_through || b.is_volume()) {
-            return;
-        }
-        let cone = scratch.primary.cone();
-        let near = |b: &&crate::world::Body| cone.is_none_or(|c| c.touches(b.center, b.radius));
-        let layered = self.world.bodies.iter().filter(near).any(|b| b.see_through && !b.is_volume());
-        let volumes = self.world.bodies.iter().filter(near).any(crate::world::Body::is_volume);
-        if !layered && !volumes {
-            return;
-        }
-        // Rays that were followed to the end have `near` beyond `far`.
-        scratch.layer_rays.rays.clear();
-        for (ray, hit) in scratch.primary.rays.iter().zip(&scratch.opaque) {
-            scratch.layer_rays.rays.push(Stretch { far: hit.t, ..*ray });
-        }
+    fn look_through<'a>(
+        &'a self,
+        layered: bool,
+        volumes: bool,
+        lit: &mut [Lit<'a>; OCTETS],
+        scratch: &mut Scratch,
+    ) {
+        scratch.through.clear();
+        scratch.through.extend(
+            scratch.rays.iter().zip(&scratch.opaque).map(|(rays, hits)| Rays { far: hits.t, ..*rays }),
+        );
         loop {
-            let Scratch { layer, layer_rays, form, .. } = &mut *scratch;
+            let Scratch { layer, through, form, bodies, .. } = &mut *scratch;
+            layer.clear();
+            layer.extend(through.iter().map(Hits::nothing));
             if layered {
-                self.nearest(|b| b.see_through && !b.is_volume(), layer_rays, layer, form);
-            } else {
-                layer.clear();
-                layer.extend(layer_rays.rays.iter().map(|r| Hit::nothing(r.far)));
+                self.nearest(|b| b.see_through && !b.is_volume(), bodies, through, layer, form);
             }
             if volumes {
                 self.march_volumes(scratch);
             }
-            if !scratch.layer.iter().any(Hit::is_some) {
+            if !scratch.layer.iter().any(|hits| hits.any().any()) {
                 return;
             }
-            let Scratch { layer, primary, lit, form, .. } = &mut *scratch;
-            self.light(primary, layer, lit, form);
-            for i in 0..scratch.layer.len() {
-                let hit = scratch.layer[i];
-                let ray = &mut scratch.layer_rays.rays[i];
-                if !hit.is_some() {
-                    ray.near = f64::INFINITY;
-                    continue;
-                }
-                let shaded = scratch.lit.shaded[i];
-                let body = &self.world.bodies[hit.body as usize];
-                if shaded.opacity > 0.0 {
-                    let place = scratch.places[i] as usize;
-                    first_surface(&mut scratch.pixels[place], &shaded, body.object, &scratch.gathered[i]);
-                    scratch.gathered[i].add(self.seen(&shaded), shaded.opacity);
-                }
-                // The same surface again begins a hair behind: the resolution of single precision.
-                ray.near = hit.t + body.radius * 2e-5;
-                if scratch.gathered[i].transparency < OPAQUE {
-                    ray.near = f64::INFINITY;
+            let Scratch { layer, rays, light, form, traced, .. } = &mut *scratch;
+            self.illumination().light(rays, layer, lit, (light, form), traced);
+            for (octet, lit) in lit.iter().enumerate() {
+                let (hits, met) = (scratch.layer[octet], scratch.layer[octet].any());
+                let rays = &mut scratch.through[octet];
+                for i in 0..LANES {
+                    if !met.has(i) {
+                        rays.close(i);
+                        continue;
+                    }
+                    let body = &self.world.bodies[hits.body.0[i] as usize];
+                    let gathered = &mut scratch.gathered[octet][i];
+                    let opacity = lit.points.opacity.0[i];
+                    if opacity > 0.0 {
+                        if gathered.half.is_none() {
+                            let mut mask = Mask8::NONE;
+                            mask.0[i] = u32::MAX;
+                            self.first_surface(&mut scratch.pixels[octet], lit, &hits, mask);
+                        }
+                        gathered.add(self.seen(lit.color.get(i), hits.t.0[i]), opacity);
+                    }
+                    // The same surface again begins a hair behind: the resolution of single precision.
+                    rays.near.0[i] = hits.t.0[i] + body.radius * 2e-5;
+                    if gathered.transparency < OPAQUE {
+                        rays.close(i);
+                    }
                 }
             }
         }
@@ -195,53 +228,63 @@ impl FrameDrawing<'_> {
 
     /// Adds the volumes between the last layer and this one, all of them together in the order of depth.
     fn march_volumes(&self, scratch: &mut Scratch) {
-        for i in 0..scratch.layer_rays.rays.len() {
-            let ray = scratch.layer_rays.rays[i];
-            let end = scratch.layer[i].t;
-            if ray.near >= end || scratch.gathered[i].transparency < OPAQUE {
-                continue;
+        for octet in 0..OCTETS {
+            let open = scratch.through[octet].open();
+            for lane in (0..LANES).filter(|&i| open.has(i)) {
+                let end = scratch.layer[octet].t.0[lane];
+                if scratch.through[octet].near.0[lane] < end
+                    && scratch.gathered[octet][lane].transparency >= OPAQUE
+                {
+                    self.march(octet, lane, end, scratch);
+                }
             }
-            for body in &self.world.bodies {
-                let (Geometry::Volume(volume), Shape::Volume(shape)) = (&*body.geometry, &*body.shape) else {
-                    continue;
-                };
-                let origin = body.object_from_world.transform_point3(ray.origin);
-                let direction = body.object_from_world.transform_vector3(ray.direction);
-                let bounds: Aabb =
-                    shape.shell.as_ref().map_or(shape.bounds(), |s| s.bounds().intersection(shape.bounds()));
-                let Some((enter, leave)) = bounds.clip(origin, direction) else { continue };
-                let object_per_world = direction.length();
-                let step = self.options.volume_step * shape.spacing().min_element() / object_per_world;
-                // Samples keep their places whatever layers cut the ray: each belongs to the part it stands in.
-                let count =
-                    ((leave.min(end) - enter) / step - 0.5).ceil().clamp(0.0, f64::from(u32::MAX / 4));
-                let first = ((ray.near - enter) / step - 0.5).ceil().clamp(0.0, count);
-                let scene = &self.world.scene;
-                let material = scene.material(&scene.objects[body.object], 0);
-                self.shine_on(body.center, &mut scratch.shines);
-                let march = March {
-                    volume: shape,
-                    material,
-                    environment: &scene.environment,
-                    origin,
-                    direction,
-                    step,
-                    object_per_world,
-                    normal_map: body.normal_map,
-                    to_eye: -ray.direction.as_vec3(),
-                };
-                let sum = &mut scratch.gathered[i];
-                let was_half = sum.half;
-                volume.march(&march, enter, first as u32..count as u32, &scratch.shines, sum);
-                if let (None, Some(t)) = (was_half, sum.half) {
-                    let pixel = &mut scratch.pixels[scratch.places[i] as usize];
-                    if pixel.id == 0 {
-                        (pixel.id, pixel.distance) = (body.object as u32 + 1, t as f32);
-                        let p = origin + direction * t;
-                        let normal = body.normal_map * -shape.gradient(p);
-                        pixel.normal = facing(normal.normalize_or(-ray.direction), ray.direction).as_vec3();
-                        pixel.albedo = shape.transfer.at(shape.value(p) as f32).0;
-                    }
+        }
+    }
+
+    /// Adds all volumes along one ray.
+    fn march(&self, octet: usize, lane: usize, end: f64, scratch: &mut Scratch) {
+        let rays = &scratch.through[octet];
+        let (eye, toward, near) = (rays.origin.get(lane), rays.direction.get(lane), rays.near.0[lane]);
+        for &index in &scratch.bodies {
+            let body = &self.world.bodies[index as usize];
+            let (Geometry::Volume(volume), Shape::Volume(shape)) = (&*body.geometry, &*body.shape) else {
+                continue;
+            };
+            let origin = body.object_from_world.transform_point3(eye);
+            let direction = body.object_from_world.transform_vector3(toward);
+            let bounds: Aabb =
+                shape.shell.as_ref().map_or(shape.bounds(), |s| s.bounds().intersection(shape.bounds()));
+            let Some((enter, leave)) = bounds.clip(origin, direction) else { continue };
+            let object_per_world = direction.length();
+            let step = self.options.volume_step * shape.spacing().min_element() / object_per_world;
+            // Samples keep their places whatever layers cut the ray: each belongs to the part it stands in.
+            let count = ((leave.min(end) - enter) / step - 0.5).ceil().clamp(0.0, f64::from(u32::MAX / 4));
+            let first = ((near - enter) / step - 0.5).ceil().clamp(0.0, count);
+            let scene = &self.world.scene;
+            let material = scene.material(&scene.objects[body.object], 0);
+            self.shine_on(body.center, &mut scratch.shines);
+            let march = March {
+                volume: shape,
+                material,
+                environment: &scene.environment,
+                origin,
+                direction,
+                step,
+                object_per_world,
+                normal_map: body.normal_map,
+                to_eye: -toward.as_vec3(),
+            };
+            let sum = &mut scratch.gathered[octet][lane];
+            let was_half = sum.half;
+            volume.march(&march, enter, first as u32..count as u32, &scratch.shines, sum);
+            if let (None, Some(t)) = (was_half, sum.half) {
+                let pixels = &mut scratch.pixels[octet];
+                if pixels.id.0[lane] == 0 {
+                    (pixels.id.0[lane], pixels.distance.0[lane]) = (body.object as u32 + 1, t as f32);
+                    let p = origin + direction * t;
+                    let normal = body.normal_map * -shape.gradient(p);
+                    pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
+                    pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
                 }
             }
         }
@@ -260,164 +303,103 @@ impl FrameDrawing<'_> {
     }
 
     /// Lights the opaque surfaces, lays what was gathered over them, and fills the pixels.
-    fn finish(&self, scratch: &mut Scratch) {
-        let Scratch { primary, opaque, lit, form, .. } = &mut *scratch;
-        self.light(primary, opaque, lit, form);
-        for i in 0..scratch.primary.rays.len() {
-            let hit = scratch.opaque[i];
-            let pixel = &mut scratch.pixels[scratch.places[i] as usize];
-            let gathered = &mut scratch.gathered[i];
-            if hit.is_some() {
-                let shaded = scratch.lit.shaded[i];
-                let object = self.world.bodies[hit.body as usize].object;
-                first_surface(pixel, &shaded, object, &Gathered { half: None, ..*gathered });
-                gathered.add(self.seen(&shaded), 1.0);
-            } else {
-                let background =
-                    self.world.scene.environment.background.color(scratch.primary.rays[i].direction);
-                gathered.add(background, 1.0);
+    #[inline(always)]
+    fn finish<'a>(&'a self, through: bool, lit: &mut [Lit<'a>; OCTETS], scratch: &mut Scratch) {
+        let Scratch { rays, opaque, light, form, traced, .. } = &mut *scratch;
+        let background = self.world.scene.environment.background.gradient();
+        if opaque.iter().any(|hits| hits.any().any()) {
+            self.illumination().light(rays, opaque, lit, (light, form), traced);
+        }
+        for octet in 0..OCTETS {
+            let (hits, met) = (&scratch.opaque[octet], scratch.opaque[octet].any());
+            let pixels = &mut scratch.pixels[octet];
+            pixels.color = background.colors(scratch.rays[octet].direction.y.round()).finite();
+            if met.any() {
+                let lit = &lit[octet];
+                self.first_surface(pixels, lit, hits, met);
+                let mut seen = lit.color;
+                if self.world.scene.environment.fog.is_some() {
+                    (0..LANES).for_each(|i| seen.set(i, self.seen(seen.get(i), hits.t.0[i])));
+                }
+                pixels.color = Vec3x8::pick(met, seen, pixels.color);
             }
-            pixel.color = gathered.color;
-            pixel.coverage = if pixel.id != 0 { 1.0 } else { 0.0 };
+            for i in (0..LANES).filter(|_| through) {
+                let gathered = &mut scratch.gathered[octet][i];
+                gathered.add(pixels.color.get(i), 1.0);
+                pixels.color.set(i, gathered.color);
+            }
         }
     }
 
-    fn seen(&self, shaded: &Shaded) -> Vec3 {
-        fogged(&self.world.scene.environment, shaded.color, shaded.t)
+    #[inline(always)]
+    fn seen(&self, color: Vec3, t: f64) -> Vec3 {
+        fogged(&self.world.scene.environment, color, t)
     }
 
-    /// Computes the points that rays met and the light on them.
-    fn light(&self, bundle: &Bundle, hits: &mut [Hit], lit: &mut Lighting, form: &mut FormScratch) {
-        let scene = &self.world.scene;
-        lit.shaded.clear();
-        for (ray, hit) in bundle.rays.iter().zip(&mut *hits) {
-            if !hit.is_some() {
-                lit.shaded.push(Shaded::NOTHING);
-                continue;
+    /// Fills the geometry channels of pixels that show nothing yet.
+    #[inline(always)]
+    fn first_surface(&self, pixels: &mut Pixels, lit: &Lit<'_>, hits: &Hits, met: Mask8) {
+        let mut free = met;
+        for i in 0..LANES {
+            if pixels.id.0[i] != 0 {
+                free.0[i] = 0;
             }
-            let body = &self.world.bodies[hit.body as usize];
-            let point: Point<'_> = body.point(scene, ray.origin, ray.direction, hit);
-            let normal = facing(point.normal, ray.direction);
-            let surface = surface(&point, normal, ray.direction);
-            lit.shaded.push(Shaded {
-                color: surface.ambient(&scene.environment),
-                albedo: point.color,
-                normal,
-                true_normal: normal,
-                position: point.position,
-                t: point.t,
-                opacity: point.opacity,
-                casting: 0,
-                dark: 0,
-            });
-        }
-        if !self.channels.has(Channel::Color) && !self.channels.has(Channel::Shadow) {
-            return;
-        }
-        for light in 0..self.world.lights.len() {
-            self.light_by(light, bundle, hits, lit, form);
-        }
-    }
-
-    /// Adds one light.
-    fn light_by(
-        &self,
-        index: usize,
-        bundle: &Bundle,
-        hits: &[Hit],
-        lit: &mut Lighting,
-        form: &mut FormScratch,
-    ) {
-        let light = &self.world.lights[index];
-        let scene = &self.world.scene;
-        lit.shadow_rays.rays.clear();
-        lit.shadow_of.clear();
-        lit.arriving.clear();
-        for (i, hit) in hits.iter().enumerate() {
-            if !hit.is_some() {
-                continue;
-            }
-            let shaded = &mut lit.shaded[i];
-            let Some(arriving) = light.arriving(shaded.position) else { continue };
-            shaded.casting += u32::from(light.casts_shadow);
-            if turned_away(shaded.true_normal, arriving.to_light) {
-                shaded.dark += u32::from(light.casts_shadow);
-                continue;
-            }
-            // Begin a hair away: the resolution of single precision for a body of that size.
-            let near = self.world.bodies[hit.body as usize].radius * 1e-5;
-            let (origin, direction) = (shaded.position, arriving.to_light);
-            lit.shadow_rays.rays.push(Stretch { origin, direction, near, far: arriving.distance });
-            lit.shadow_of.push(i as u32);
-            lit.arriving.push(arriving);
-        }
-        lit.blocked.clear();
-        lit.blocked.extend(lit.shadow_rays.rays.iter().map(|r| Hit::nothing(r.far)));
-        if light.casts_shadow && self.options.shadows && !lit.shadow_rays.rays.is_empty() {
-            let cone = lit.shadow_rays.cone();
-            for (i, body) in self.world.bodies.iter().enumerate() {
-                if !body.see_through && cone.is_none_or(|c| c.touches(body.center, body.radius)) {
-                    body.cast(i as u32, Crossing::Entry, &lit.shadow_rays, &mut lit.blocked, form);
-                    // One thing in the way is enough: blocked rays are not followed further.
-                    for (ray, hit) in lit.shadow_rays.rays.iter_mut().zip(&lit.blocked) {
-                        if hit.is_some() {
-                            ray.far = -1.0;
-                        }
-                    }
+            if free.has(i) {
+                pixels.id.0[i] = self.world.bodies[hits.body.0[i] as usize].object as u32 + 1;
+                if lit.casting.0[i] > 0 {
+                    pixels.shadow.0[i] = 1.0 - lit.dark.0[i] as f32 / lit.casting.0[i] as f32;
                 }
             }
         }
-        for ((&i, blocked), arriving) in lit.shadow_of.iter().zip(&lit.blocked).zip(&lit.arriving) {
-            let shaded = &mut lit.shaded[i as usize];
-            if blocked.is_some() {
-                shaded.dark += 1;
-                continue;
-            }
-            let (ray, hit) = (&bundle.rays[i as usize], &hits[i as usize]);
-            let body = &self.world.bodies[hit.body as usize];
-            let surface = Surface {
-                material: body.material_at(scene, shaded.position),
-                color: shaded.albedo,
-                normal: shaded.normal.as_vec3(),
-                to_eye: -ray.direction.as_vec3(),
-            };
-            let model = scene.environment.lighting;
-            shaded.color += surface.lit_by(model, arriving.to_light.as_vec3(), arriving.radiance);
-        }
+        pixels.distance = free.pick(hits.t.round(), pixels.distance);
+        pixels.normal = Vec3x8::pick(free, lit.points.normal.round(), pixels.normal);
+        pixels.albedo = Vec3x8::pick(free, lit.points.color, pixels.albedo);
     }
 }
 
-fn surface<'a>(point: &Point<'a>, normal: DVec3, direction: DVec3) -> Surface<'a> {
-    Surface {
-        material: point.material,
-        color: point.color,
-        normal: normal.as_vec3(),
-        to_eye: -direction.as_vec3(),
-    }
+/// Eight pixels.
+#[derive(Clone, Copy)]
+struct Pixels {
+    color: Vec3x8,
+    distance: F32x8,
+    normal: Vec3x8,
+    /// 0 where there is nothing.
+    id: Mask8,
+    albedo: Vec3x8,
+    shadow: F32x8,
 }
 
-/// Fills the geometry channels from the first surface, unless a volume was dense before it.
-fn first_surface(pixel: &mut Pixel, shaded: &Shaded, object: usize, gathered: &Gathered) {
-    if pixel.id != 0 || gathered.half.is_some() {
-        return;
-    }
-    pixel.id = object as u32 + 1;
-    pixel.distance = shaded.t as f32;
-    pixel.normal = shaded.normal.as_vec3();
-    pixel.albedo = shaded.albedo;
-    pixel.shadow = if shaded.casting == 0 { 1.0 } else { 1.0 - shaded.dark as f32 / shaded.casting as f32 };
-}
+impl Pixels {
+    const BLACK: Vec3x8 = Vec3x8 { x: F32x8::ZERO, y: F32x8::ZERO, z: F32x8::ZERO };
 
-impl Shaded {
     const NOTHING: Self = Self {
-        color: Vec3::ZERO,
-        albedo: Vec3::ZERO,
-        normal: DVec3::ZERO,
-        true_normal: DVec3::ZERO,
-        position: DVec3::ZERO,
-        t: f64::INFINITY,
-        opacity: 0.0,
-        casting: 0,
-        dark: 0,
+        color: Self::BLACK,
+        distance: F32x8([f32::INFINITY; LANES]),
+        normal: Self::BLACK,
+        id: Mask8::NONE,
+        albedo: Self::BLACK,
+        shadow: F32x8([1.0; LANES]),
     };
+
+    /// Writes them into all planes that are there, as many as the row has.
+    #[inline(always)]
+    fn put(&self, band: &mut Band<'_>, column: u32, row: u32) {
+        let count = LANES.min((band.width - column) as usize);
+        let first = row as usize * band.width as usize + column as usize;
+        put(band.color, first, count, |i| self.color.get(i));
+        put(band.distance, first, count, |i| self.distance.0[i]);
+        put(band.normal, first, count, |i| self.normal.get(i));
+        put(band.id, first, count, |i| self.id.0[i]);
+        put(band.albedo, first, count, |i| self.albedo.get(i));
+        put(band.shadow, first, count, |i| self.shadow.0[i]);
+        put(band.coverage, first, count, |i| if self.id.0[i] != 0 { 1.0 } else { 0.0 });
+    }
+}
+
+#[inline(always)]
+fn put<T>(plane: &mut [T], first: usize, count: usize, value: impl Fn(usize) -> T) {
+    let Some(row) = plane.get_mut(first..first + count) else { return };
+    for (i, v) in row.iter_mut().enumerate() {
+        *v = value(i);
+    }
 }

@@ -16,6 +16,7 @@ mod field;
 mod form;
 mod frame;
 mod heights;
+mod light;
 mod program;
 mod renderer;
 mod roots;

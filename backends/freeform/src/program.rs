@@ -1,8 +1,9 @@
 //! A free form as a list of steps for a stack machine, and which of them matter in a part of space.
 
 use glam::DVec3;
+use polyptych_core::lanes::{DVec3x8, F64x8};
 use polyptych_core::math::{Aabb, Interval};
-use polyptych_core::scene::{Form, Power, Quadric};
+use polyptych_core::scene::{Form, Perturbation, Power, Quadric};
 
 /// One step. Functions are pushed on a stack; combinations take theirs from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +12,8 @@ pub(crate) enum Step {
     Leaf(u32),
     /// Takes `q`, then adds `weight * R(q)` to what lies below.
     Term { weight: f64, power: Power },
+    /// Adds `weight * R(q)` of a quadric: the perturbation that most forms are made of.
+    Bump { leaf: u32, weight: f64, power: Power },
     /// Takes two, pushes the larger.
     Max,
     /// Takes two, pushes the smaller.
@@ -44,7 +47,7 @@ impl Program {
         for step in &program.steps {
             height = match step {
                 Step::Leaf(_) => height + 1,
-                Step::Neg | Step::Add(_) => height,
+                Step::Neg | Step::Add(_) | Step::Bump { .. } => height,
                 _ => height - 1,
             };
             program.depth = program.depth.max(height);
@@ -71,9 +74,14 @@ impl Program {
             }
             Form::Perturbed { base, terms } => {
                 self.push(base);
-                for term in terms {
-                    self.push(&term.function);
-                    self.steps.push(Step::Term { weight: term.weight, power: term.power });
+                for &Perturbation { weight, power, ref function } in terms {
+                    self.push(function);
+                    match self.steps.last_mut() {
+                        Some(last @ &mut Step::Leaf(leaf)) if function.as_quadric().is_some() => {
+                            *last = Step::Bump { leaf, weight, power };
+                        }
+                        _ => self.steps.push(Step::Term { weight, power }),
+                    }
                 }
             }
             Form::Union(parts) => self.combine(parts, Step::Max, f64::NEG_INFINITY),
@@ -137,7 +145,17 @@ impl Active {
                     self.stack.push((self.steps.len(), program.leaves[leaf as usize].interval(part)));
                     self.steps.push(step);
                 }
-                Step::Term { weight, power } => self.term(weight, power),
+                Step::Term { weight, power } => {
+                    if let Some((begin, q)) = self.stack.pop() {
+                        self.add(q, weight, power, step);
+                        if q.hi <= 0.0 {
+                            self.steps.truncate(begin);
+                        }
+                    }
+                }
+                Step::Bump { leaf, weight, power } => {
+                    self.add(program.leaves[leaf as usize].interval(part), weight, power, step);
+                }
                 Step::Max => self.select(step, |a, b| a.lo >= b.hi, Interval::max),
                 Step::Min => self.select(step, |a, b| a.hi <= b.lo, Interval::min),
                 Step::Neg => self.unary(step, |a| -a),
@@ -150,10 +168,9 @@ impl Active {
         self.stack.first().map_or(Interval::point(-1.0), |top| top.1)
     }
 
-    fn term(&mut self, weight: f64, power: Power) {
-        let Some((begin, q)) = self.stack.pop() else { return };
+    /// Adds a perturbation to what lies below, unless it is zero everywhere.
+    fn add(&mut self, q: Interval, weight: f64, power: Power, step: Step) {
         if q.hi <= 0.0 {
-            self.steps.truncate(begin);
             return;
         }
         let q = q.positive_part();
@@ -164,7 +181,7 @@ impl Active {
         if let Some(base) = self.stack.last_mut() {
             base.1 = base.1 + raised * weight;
         }
-        self.steps.push(Step::Term { weight, power });
+        self.steps.push(step);
     }
 
     fn unary(&mut self, step: Step, apply: impl Fn(Interval) -> Interval) {
@@ -203,63 +220,104 @@ fn smooth(a: Interval, b: Interval, k: f64) -> Interval {
     a.max(b) + Interval::new(fillet(farthest), fillet(nearest))
 }
 
-/// Evaluates steps and their gradient at a point, in double precision.
-pub(crate) fn value_and_gradient(
+/// Evaluates steps and their gradients at eight points, in double precision.
+#[inline(always)]
+pub(crate) fn values_and_gradients(
     program: &Program,
     steps: &[Step],
-    p: DVec3,
-    stack: &mut Vec<(f64, DVec3)>,
-) -> (f64, DVec3) {
+    p: DVec3x8,
+    stack: &mut Vec<(F64x8, DVec3x8)>,
+) -> (F64x8, DVec3x8) {
+    let quadric = |leaf: u32| value_and_gradient(&program.leaves[leaf as usize].0, p);
+    let number = F64x8::splat;
     stack.clear();
-    for &step in steps {
-        if let Step::Leaf(leaf) = step {
-            let q = &program.leaves[leaf as usize];
-            stack.push((q.value(p), q.gradient(p)));
-            continue;
-        }
-        let Some((b, db)) = stack.pop() else { break };
-        if let Step::Neg | Step::Add(_) = step {
-            stack.push(if let Step::Add(amount) = step { (b + amount, db) } else { (-b, -db) });
-            continue;
+    // The top of the stack.
+    let (mut b, mut db) = (number(-1.0), DVec3x8::splat(DVec3::ZERO));
+    for (i, &step) in steps.iter().enumerate() {
+        match step {
+            Step::Leaf(leaf) => {
+                if i > 0 {
+                    stack.push((b, db));
+                }
+                (b, db) = quadric(leaf);
+                continue;
+            }
+            Step::Bump { leaf, weight, power } => {
+                let (q, dq) = quadric(leaf);
+                let (r, slope) = raised(q, weight, power);
+                (b, db) = (b + r, db + dq.scaled(slope));
+                continue;
+            }
+            Step::Neg => {
+                (b, db) = (-b, db.scaled(number(-1.0)));
+                continue;
+            }
+            Step::Add(amount) => {
+                b = b + number(amount);
+                continue;
+            }
+            _ => {}
         }
         let Some((a, da)) = stack.pop() else { break };
-        stack.push(match step {
+        (b, db) = match step {
             Step::Term { weight, power } => {
-                let (r, slope) = power.apply(b);
-                (a + weight * r, da + db * (weight * slope))
+                let (r, slope) = raised(b, weight, power);
+                (a + r, da + db.scaled(slope))
             }
             Step::Max => {
-                if a >= b {
-                    (a, da)
-                } else {
-                    (b, db)
-                }
+                let first = a.at_least(b);
+                (F64x8::pick(first, a, b), DVec3x8::pick(first, da, db))
             }
             Step::Min => {
-                if a <= b {
-                    (a, da)
-                } else {
-                    (b, db)
-                }
+                let first = b.at_least(a);
+                (F64x8::pick(first, a, b), DVec3x8::pick(first, da, db))
             }
             Step::Smooth(k) => {
-                let (top, dtop, low, dlow) = if a >= b { (a, da, b, db) } else { (b, db, a, da) };
-                let overlap = (k - (top - low)).max(0.0);
-                let share = overlap / (2.0 * k);
-                (top + overlap * overlap / (4.0 * k), dtop * (1.0 - share) + dlow * share)
+                let first = a.at_least(b);
+                let (top, low) = (F64x8::pick(first, a, b), F64x8::pick(first, b, a));
+                let (dtop, dlow) = (DVec3x8::pick(first, da, db), DVec3x8::pick(first, db, da));
+                let overlap = (number(k) - (top - low)).max(F64x8::ZERO);
+                let share = overlap * number(0.5 / k);
+                (top + overlap * overlap * number(0.25 / k), dtop + (dlow - dtop).scaled(share))
             }
-            Step::Mix(t) => (a * (1.0 - t) + b * t, da * (1.0 - t) + db * t),
-            Step::Torus(ring) => (ring * a - b * b, da * ring - db * (2.0 * b)),
-            Step::Leaf(_) | Step::Neg | Step::Add(_) => (a, da),
-        });
+            Step::Mix(t) => {
+                let (s, t) = (number(1.0 - t), number(t));
+                (a * s + b * t, da.scaled(s) + db.scaled(t))
+            }
+            Step::Torus(ring) => {
+                let ring = number(ring);
+                (ring * a - b * b, da.scaled(ring) - db.scaled(b + b))
+            }
+            Step::Leaf(_) | Step::Bump { .. } | Step::Neg | Step::Add(_) => (b, db),
+        };
     }
-    stack.first().copied().unwrap_or((-1.0, DVec3::ZERO))
+    (b, db)
+}
+
+#[inline(always)]
+fn value_and_gradient(q: &[f64; 10], p: DVec3x8) -> (F64x8, DVec3x8) {
+    let [qa, qb, qc, qd, qe, qf, qg, qh, qi, qk] = q.map(F64x8::splat);
+    let DVec3x8 { x, y, z } = p;
+    let (ax, by, cz) = (qa * x, qb * y, qc * z);
+    let (dx, dy, ex, ez, fy, fz) = (qd * x, qd * y, qe * x, qe * z, qf * y, qf * z);
+    let gradient =
+        DVec3x8 { x: ax + ax + dy + ez + qg, y: by + by + dx + fz + qh, z: cz + cz + ex + fy + qi };
+    (x * (ax + dy + ez + qg) + y * (by + fz + qh) + z * (cz + qi) + qk, gradient)
+}
+
+/// Returns `weight * R(q)` and its slope.
+#[inline(always)]
+fn raised(q: F64x8, weight: f64, power: Power) -> (F64x8, F64x8) {
+    let (q, w) = (q.max(F64x8::ZERO), F64x8::splat(weight));
+    match power {
+        Power::Square => (w * (q * q), w * (q + q)),
+        Power::Cube => (w * (q * q * q), w * (F64x8::splat(3.0) * (q * q))),
+    }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use polyptych_core::scene::Perturbation;
 
     /// A figure that uses every step.
     pub(crate) fn everything() -> Form {
@@ -305,8 +363,12 @@ pub(crate) mod tests {
             let part = Aabb::new(middle - 0.1, middle + 0.1);
             let bounds = active.prune(&program, &program.steps, &part);
             shorter += usize::from(active.steps.len() < program.steps.len());
-            for corner in part.corners() {
-                let (value, gradient) = value_and_gradient(&program, &active.steps, corner, &mut stack);
+            let corners = part.corners();
+            let mut points = DVec3x8::splat(DVec3::ZERO);
+            corners.iter().enumerate().for_each(|(i, c)| points.set(i, *c));
+            let (values, gradients) = values_and_gradients(&program, &active.steps, points, &mut stack);
+            for (i, corner) in corners.into_iter().enumerate() {
+                let (value, gradient) = (values.0[i], gradients.get(i));
                 let (exact, slope) = form.value_and_gradient(corner);
                 assert!(
                     (value - exact).abs() <= 1e-12 * (1.0 + exact.abs()),

@@ -272,7 +272,7 @@ impl Renderer for Freeform {
         control.check()?;
         phases.end("draw");
         let rays =
-            scratch[..bands].iter().map(|s| s.lock().unwrap_or_else(PoisonError::into_inner).rays).sum();
+            scratch[..bands].iter().map(|s| s.lock().unwrap_or_else(PoisonError::into_inner).traced).sum();
         let mut report =
             Report { objects: world.decisions.clone(), phases, bytes: self.bytes, ..Report::default() };
         report.counters[0] = Some(Counter { name: "rays", count: rays });

@@ -7,8 +7,9 @@
 //! [`FINEST`] of the stretch.
 
 use crate::bundle::Crossing;
+use crate::form::Parabola;
 use crate::program::Step;
-use polyptych_core::lanes::{F32x8, LANES, Mask8};
+use polyptych_core::lanes::{F32x8, F64x8, LANES, Mask8};
 use polyptych_core::scene::Power;
 
 /// Shortest stretch that is still halved, as a share of the whole: the resolution of single precision.
@@ -28,60 +29,42 @@ pub(crate) struct RayQuadric {
 
 /// Bounds of a function and its derivative over a stretch.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Range {
+struct Range {
     lo: F32x8,
     hi: F32x8,
     slope_lo: F32x8,
     slope_hi: F32x8,
 }
 
+impl RayQuadric {
+    /// Rounds a quadric along rays that is looked at up to `reach` from their points.
+    #[inline(always)]
+    pub(crate) fn new(along: &Parabola, reach: F64x8) -> Self {
+        let Parabola { a, b, c } = *along;
+        // Three roundings of single precision on each term, doubled.
+        let error =
+            ((a.abs() * reach + b.abs()) * reach + c.abs()) * F64x8::splat(6.0 * f64::from(f32::EPSILON));
+        Self { a: a.round(), b: b.round(), c: c.round(), error: error.round() }
+    }
+
+    pub(crate) const ZERO: Self = Self { a: F32x8::ZERO, b: F32x8::ZERO, c: F32x8::ZERO, error: F32x8::ZERO };
+}
+
 impl Range {
-    pub(crate) const ZERO: Self =
+    const ZERO: Self =
         Self { lo: F32x8::ZERO, hi: F32x8::ZERO, slope_lo: F32x8::ZERO, slope_hi: F32x8::ZERO };
 }
 
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(crate) struct Stack {
-    pub(crate) ranges: Vec<Range>,
-    pub(crate) values: Vec<(F32x8, F32x8)>,
+    ranges: Vec<Range>,
+    values: Vec<(F32x8, F32x8)>,
 }
 
 /// Finds the first root of each active ray in `[from, to]`. Returns which rays have one, and where.
-pub(crate) fn first_roots(
-    steps: &[Step],
-    leaves: &[RayQuadric],
-    from: F32x8,
-    to: F32x8,
-    active: Mask8,
-    crossing: Crossing,
-    stack: &mut Stack,
-) -> (Mask8, F32x8) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        #[expect(unsafe_code, reason = "a kernel compiled for a processor feature can only be called so")]
-        // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-        return unsafe { first_roots_avx2(steps, leaves, from, to, active, crossing, stack) };
-    }
-    search(steps, leaves, from, to, active, crossing, stack)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn first_roots_avx2(
-    steps: &[Step],
-    leaves: &[RayQuadric],
-    from: F32x8,
-    to: F32x8,
-    active: Mask8,
-    crossing: Crossing,
-    stack: &mut Stack,
-) -> (Mask8, F32x8) {
-    search(steps, leaves, from, to, active, crossing, stack)
-}
-
 #[inline(always)]
-fn search(
+pub(crate) fn first_roots(
     steps: &[Step],
     leaves: &[RayQuadric],
     from: F32x8,
@@ -93,7 +76,7 @@ fn search(
     let half = F32x8::splat(0.5);
     let shortest = (to - from) * F32x8::splat(FINEST);
     let mut begin = from;
-    let mut length = (to - from) * half;
+    let mut length = to - from;
     let mut open = active & to.at_least(from);
     let (mut hit, mut root) = (Mask8::NONE, F32x8::ZERO);
     while open.any() {
@@ -115,7 +98,11 @@ fn search(
             };
             let found = search & change;
             if found.any() {
-                let refined = refine(steps, leaves, begin, end, inside, &mut stack.values);
+                let refined = match crossing {
+                    Crossing::Any => refine(steps, leaves, begin, end, found, inside, &mut stack.values),
+                    // What blocks light does so wherever it is.
+                    Crossing::Entry => begin,
+                };
                 root = found.pick(refined, root);
                 hit = hit | found;
                 open = open & !found;
@@ -136,10 +123,13 @@ fn refine(
     leaves: &[RayQuadric],
     mut lo: F32x8,
     mut hi: F32x8,
+    wanted: Mask8,
     inside_at_lo: Mask8,
     values: &mut Vec<(F32x8, F32x8)>,
 ) -> F32x8 {
     let half = F32x8::splat(0.5);
+    // The next step of Newton's method squares what is left of a share of the bracket.
+    let close = (hi - lo) * F32x8::splat(1e-4);
     let mut u = (lo + hi) * half;
     for _ in 0..7 {
         let (f, slope) = value(steps, leaves, u, values);
@@ -149,7 +139,12 @@ fn refine(
         hi = same.pick(hi, u);
         let newton = u - f / slope;
         let within = newton.at_least(lo) & hi.at_least(newton);
-        u = within.pick(newton, (lo + hi) * half);
+        let next = within.pick(newton, (lo + hi) * half);
+        let moved = (next - u).abs().above(close) & wanted;
+        u = next;
+        if !moved.any() {
+            break;
+        }
     }
     u
 }
@@ -157,29 +152,43 @@ fn refine(
 /// Evaluates the form and its derivative along the rays.
 #[inline(always)]
 fn value(steps: &[Step], leaves: &[RayQuadric], u: F32x8, stack: &mut Vec<(F32x8, F32x8)>) -> (F32x8, F32x8) {
+    let quadric = |leaf: u32| {
+        let q = &leaves[leaf as usize];
+        ((q.a * u + q.b) * u + q.c, (q.a + q.a) * u + q.b)
+    };
+    let number = |value: f64| F32x8::splat(value as f32);
     stack.clear();
-    for &step in steps {
-        if let Step::Leaf(leaf) = step {
-            let q = &leaves[leaf as usize];
-            stack.push(((q.a * u + q.b) * u + q.c, (q.a + q.a) * u + q.b));
-            continue;
-        }
-        let Some((b, db)) = stack.pop() else { break };
-        if let Step::Neg | Step::Add(_) = step {
-            stack.push(if let Step::Add(c) = step { (b + F32x8::splat(c as f32), db) } else { (-b, -db) });
-            continue;
+    // The top of the stack.
+    let (mut b, mut db) = (F32x8::splat(-1.0), F32x8::ZERO);
+    for (i, &step) in steps.iter().enumerate() {
+        match step {
+            Step::Leaf(leaf) => {
+                if i > 0 {
+                    stack.push((b, db));
+                }
+                (b, db) = quadric(leaf);
+                continue;
+            }
+            Step::Bump { leaf, weight, power } => {
+                let (r, dr) = raised(quadric(leaf), weight, power);
+                (b, db) = (b + r, db + dr);
+                continue;
+            }
+            Step::Neg => {
+                (b, db) = (-b, -db);
+                continue;
+            }
+            Step::Add(amount) => {
+                b = b + number(amount);
+                continue;
+            }
+            _ => {}
         }
         let Some((a, da)) = stack.pop() else { break };
-        stack.push(match step {
+        (b, db) = match step {
             Step::Term { weight, power } => {
-                let (w, q) = (F32x8::splat(weight as f32), b.max(F32x8::ZERO));
-                match power {
-                    Power::Square => (a + w * (q * q), da + w * (q + q) * db),
-                    Power::Cube => {
-                        let q2 = q * q;
-                        (a + w * (q2 * q), da + w * (F32x8::splat(3.0) * q2) * db)
-                    }
-                }
+                let (r, dr) = raised((b, db), weight, power);
+                (a + r, da + dr)
             }
             Step::Max => {
                 let first = a.at_least(b);
@@ -190,55 +199,78 @@ fn value(steps: &[Step], leaves: &[RayQuadric], u: F32x8, stack: &mut Vec<(F32x8
                 (first.pick(a, b), first.pick(da, db))
             }
             Step::Smooth(k) => {
-                let (first, k) = (a.at_least(b), k as f32);
+                let first = a.at_least(b);
                 let (top, low) = (first.pick(a, b), first.pick(b, a));
                 let (dtop, dlow) = (first.pick(da, db), first.pick(db, da));
-                let overlap = (F32x8::splat(k) - (top - low)).max(F32x8::ZERO);
-                let share = overlap * F32x8::splat(0.5 / k);
-                (top + overlap * overlap * F32x8::splat(0.25 / k), dtop + (dlow - dtop) * share)
+                let overlap = (number(k) - (top - low)).max(F32x8::ZERO);
+                let share = overlap * number(0.5 / k);
+                (top + overlap * overlap * number(0.25 / k), dtop + (dlow - dtop) * share)
             }
             Step::Mix(t) => {
-                let (s, t) = (F32x8::splat((1.0 - t) as f32), F32x8::splat(t as f32));
+                let (s, t) = (number(1.0 - t), number(t));
                 (a * s + b * t, da * s + db * t)
             }
             Step::Torus(ring) => {
-                let ring = F32x8::splat(ring as f32);
+                let ring = number(ring);
                 (ring * a - b * b, ring * da - (b + b) * db)
             }
-            Step::Leaf(_) | Step::Neg | Step::Add(_) => (a, da),
-        });
+            Step::Leaf(_) | Step::Bump { .. } | Step::Neg | Step::Add(_) => (b, db),
+        };
     }
-    stack.first().copied().unwrap_or((F32x8::splat(-1.0), F32x8::ZERO))
+    (b, db)
+}
+
+/// Returns `weight * R(q)` and its derivative.
+#[inline(always)]
+fn raised((q, dq): (F32x8, F32x8), weight: f64, power: Power) -> (F32x8, F32x8) {
+    let (q, w) = (q.max(F32x8::ZERO), F32x8::splat(weight as f32));
+    match power {
+        Power::Square => (w * (q * q), w * (q + q) * dq),
+        Power::Cube => {
+            let q2 = q * q;
+            (w * (q2 * q), w * (F32x8::splat(3.0) * q2) * dq)
+        }
+    }
 }
 
 /// Bounds the form and its derivative over `[u0, u1]`.
 #[inline(always)]
 fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mut Vec<Range>) -> Range {
     stack.clear();
-    for &step in steps {
-        if let Step::Leaf(leaf) = step {
-            stack.push(leaf_range(&leaves[leaf as usize], u0, u1));
-            continue;
-        }
-        let Some(b) = stack.pop() else { break };
-        if let Step::Neg = step {
-            stack.push(Range { lo: -b.hi, hi: -b.lo, slope_lo: -b.slope_hi, slope_hi: -b.slope_lo });
-            continue;
-        }
-        if let Step::Add(c) = step {
-            let c = F32x8::splat(c as f32);
-            stack.push(widened(Range { lo: b.lo + c, hi: b.hi + c, ..b }));
-            continue;
+    // The top of the stack.
+    let mut b = Range { lo: F32x8::splat(-1.0), hi: F32x8::splat(-1.0), ..Range::ZERO };
+    for (i, &step) in steps.iter().enumerate() {
+        match step {
+            Step::Leaf(leaf) => {
+                if i > 0 {
+                    stack.push(b);
+                }
+                b = leaf_range(&leaves[leaf as usize], u0, u1);
+                continue;
+            }
+            Step::Bump { leaf, weight, power } => {
+                let q = leaf_range(&leaves[leaf as usize], u0, u1);
+                if q.hi.above(F32x8::ZERO).any() {
+                    b = widened(term_range(b, q, weight as f32, power));
+                }
+                continue;
+            }
+            Step::Neg => {
+                b = flipped(b);
+                continue;
+            }
+            Step::Add(c) => {
+                let c = F32x8::splat(c as f32);
+                b = widened(Range { lo: b.lo + c, hi: b.hi + c, ..b });
+                continue;
+            }
+            _ => {}
         }
         let Some(a) = stack.pop() else { break };
-        stack.push(widened(match step {
+        b = widened(match step {
             Step::Term { weight, power } => term_range(a, b, weight as f32, power),
             Step::Max => max_range(a, b),
-            Step::Min => {
-                let flip =
-                    |r: Range| Range { lo: -r.hi, hi: -r.lo, slope_lo: -r.slope_hi, slope_hi: -r.slope_lo };
-                flip(max_range(flip(a), flip(b)))
-            }
+            Step::Min => flipped(max_range(flipped(a), flipped(b))),
             Step::Smooth(k) => smooth_range(a, b, k as f32),
             Step::Mix(t) => sum(scaled(a, (1.0 - t) as f32), scaled(b, t as f32)),
             Step::Torus(ring) => {
@@ -248,10 +280,15 @@ fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mu
                 let minus = Range { lo: -s_hi, hi: -s_lo, slope_lo: p_hi * two, slope_hi: p_lo * two };
                 sum(scaled(a, ring as f32), minus)
             }
-            Step::Leaf(_) | Step::Neg | Step::Add(_) => a,
-        }));
+            Step::Leaf(_) | Step::Bump { .. } | Step::Neg | Step::Add(_) => b,
+        });
     }
-    stack.first().copied().unwrap_or(Range { lo: F32x8::splat(-1.0), hi: F32x8::splat(-1.0), ..Range::ZERO })
+    b
+}
+
+#[inline(always)]
+fn flipped(r: Range) -> Range {
+    Range { lo: -r.hi, hi: -r.lo, slope_lo: -r.slope_hi, slope_hi: -r.slope_lo }
 }
 
 /// Bounds a parabola exactly: by its ends, and its vertex where that lies between.
@@ -395,32 +432,10 @@ mod tests {
                 let origin = point().normalize_or(DVec3::X) * 3.0;
                 (origin, (point() - origin).normalize_or(DVec3::X))
             });
-            let packet = crate::form::RayPacket::around(&rays, 3.0, 3.0);
-            let leaves: Vec<_> = program.leaves.iter().map(|q| packet.quadric(q)).collect();
-            let all = Mask8([u32::MAX; LANES]);
-            let (hit, root) = first_roots(
-                &program.steps,
-                &leaves,
-                F32x8::splat(-3.0),
-                F32x8::splat(3.0),
-                all,
-                Crossing::Any,
-                &mut stack,
-            );
-            let plain = search(
-                &program.steps,
-                &leaves,
-                F32x8::splat(-3.0),
-                F32x8::splat(3.0),
-                all,
-                Crossing::Any,
-                &mut stack,
-            );
-            assert_eq!(
-                (hit.0, root.0.map(f32::to_bits)),
-                (plain.0.0, plain.1.0.map(f32::to_bits)),
-                "one width only"
-            );
+            let leaves = crate::form::tests::along(&program, &rays, 3.0, 3.0);
+            let (from, to) = (F32x8::splat(-3.0), F32x8::splat(3.0));
+            let (hit, root) =
+                first_roots(&program.steps, &leaves, from, to, Mask8::ALL, Crossing::Any, &mut stack);
             for (lane, &(o, d)) in rays.iter().enumerate() {
                 let steps = 20_000;
                 let at = |i: i32| form.value(o + d * (6.0 * f64::from(i) / f64::from(steps)));

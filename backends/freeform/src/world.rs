@@ -1,12 +1,13 @@
 //! What is prepared of a scene: a body for each object, in the form in which it is cast.
 
-use crate::bundle::{Bundle, Crossing, Hit};
+use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::field;
 use crate::form::{FormBody, FormScratch};
 use crate::heights::HeightBody;
 use crate::volume::VolumeBody;
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::convert::DistanceModel;
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{FreeForm, Light, Material, Object, Primitive, Scene, Shape};
 use polyptych_core::seam::Decision;
@@ -44,15 +45,33 @@ pub(crate) enum Geometry {
     Field(Arc<DistanceModel>),
 }
 
-/// A point of a surface.
-pub(crate) struct Point<'a> {
-    pub(crate) t: f64,
-    pub(crate) position: DVec3,
-    /// Unit normal in the world, not turned to the eye.
-    pub(crate) normal: DVec3,
-    pub(crate) material: &'a Material,
-    pub(crate) color: Vec3,
-    pub(crate) opacity: f32,
+/// Eight points of surfaces.
+#[derive(Clone, Copy)]
+pub(crate) struct Points<'a> {
+    /// Which of them there are.
+    pub(crate) there: Mask8,
+    pub(crate) position: DVec3x8,
+    /// Unit normals in the world, on the viewer's side.
+    pub(crate) normal: DVec3x8,
+    /// Nothing where there is no point.
+    pub(crate) material: [Option<&'a Material>; LANES],
+    pub(crate) color: Vec3x8,
+    pub(crate) opacity: F32x8,
+    /// How far from a point a ray begins that leaves it: the resolution of single precision for a body of that
+    /// size.
+    pub(crate) hair: F64x8,
+}
+
+impl Points<'_> {
+    pub(crate) const NONE: Self = Self {
+        there: Mask8::NONE,
+        position: NOWHERE,
+        normal: NOWHERE,
+        material: [None; LANES],
+        color: Vec3x8 { x: F32x8::ZERO, y: F32x8::ZERO, z: F32x8::ZERO },
+        opacity: F32x8::ZERO,
+        hair: F64x8::ZERO,
+    };
 }
 
 impl Geometry {
@@ -110,104 +129,122 @@ impl Body {
         matches!(*self.geometry, Geometry::Volume(_))
     }
 
-    /// Improves `hits` where a ray of the bundle meets the surface sooner. Volumes have none.
+    /// Improves `hits` where a ray meets the surface sooner. Volumes have none.
     pub(crate) fn cast(
         &self,
         index: u32,
         crossing: Crossing,
-        bundle: &Bundle,
-        hits: &mut [Hit],
+        rays: &[Rays],
+        hits: &mut [Hits],
         scratch: &mut FormScratch,
     ) {
         let bounds = match &*self.geometry {
             Geometry::Volume(_) => return,
             Geometry::Form(form) => {
-                form.cast(&self.object_from_world, index, crossing, bundle, hits, scratch);
+                form.cast(&self.object_from_world, index, crossing, rays, hits, scratch);
                 return;
             }
             Geometry::Field(model) => field::bounds(model),
             Geometry::Plane { .. } | Geometry::Heights(_) => self.shape.bounds(),
         };
-        for (stretch, hit) in bundle.rays.iter().zip(hits) {
-            let origin = self.object_from_world.transform_point3(stretch.origin);
-            let direction = self.object_from_world.transform_vector3(stretch.direction);
-            let Some((near, far)) = bounds.clip(origin, direction) else { continue };
-            let (near, far) = (near.max(stretch.near), far.min(stretch.far).min(hit.t));
-            if near > far {
-                continue;
-            }
-            let t = match (&*self.geometry, &*self.shape) {
-                (Geometry::Heights(body), Shape::HeightField(heights)) => {
-                    body.cast(heights, origin, direction, near, far)
+        for (rays, hits) in rays.iter().zip(hits) {
+            let open = rays.open();
+            for i in (0..LANES).filter(|&i| open.has(i)) {
+                let origin = self.object_from_world.transform_point3(rays.origin.get(i));
+                let direction = self.object_from_world.transform_vector3(rays.direction.get(i));
+                let Some((near, far)) = bounds.clip(origin, direction) else { continue };
+                let (near, far) = (near.max(rays.near.0[i]), far.min(rays.far.0[i]).min(hits.t.0[i]));
+                if near > far {
+                    continue;
                 }
-                (Geometry::Field(model), _) => field::cast(model, origin, direction, near, far),
-                // The bounds of a plane are the plane.
-                _ => (direction.y != 0.0 && near > 0.0).then_some(near),
-            };
-            if let Some(t) = t.filter(|&t| t < hit.t) {
-                *hit = Hit { t, body: index, normal: DVec3::ZERO };
+                let t = match (&*self.geometry, &*self.shape) {
+                    (Geometry::Heights(body), Shape::HeightField(heights)) => {
+                        body.cast(heights, origin, direction, near, far)
+                    }
+                    (Geometry::Field(model), _) => field::cast(model, origin, direction, near, far),
+                    // The bounds of a plane are the plane.
+                    _ => (direction.y != 0.0 && near > 0.0).then_some(near),
+                };
+                if let Some(t) = t.filter(|&t| t < hits.t.0[i]) {
+                    (hits.t.0[i], hits.body.0[i]) = (t, index);
+                }
             }
         }
     }
 
-    /// Returns the point that a ray met, with its material.
-    pub(crate) fn point<'a>(
+    /// Fills in the points that some of eight rays met on this body.
+    #[inline(always)]
+    pub(crate) fn fill<'a>(
         &'a self,
         scene: &'a Scene,
-        origin: DVec3,
-        direction: DVec3,
-        hit: &Hit,
-    ) -> Point<'a> {
-        let t = hit.t;
-        let position = origin + direction * t;
-        let local = self.object_from_world.transform_point3(position);
-        let object = &scene.objects[self.object];
-        let (mut uv, mut slot_material) = (None, scene.material(object, 0));
-        let normal = match (&*self.geometry, &*self.shape) {
-            (Geometry::Form(_), shape) => {
-                if let Shape::Primitive(primitive) = shape {
-                    uv = Some(primitive.uv(local, hit.normal.normalize_or_zero()));
-                }
-                hit.normal
+        rays: &Rays,
+        hits: &Hits,
+        met: Mask8,
+        points: &mut Points<'a>,
+    ) {
+        let position = rays.origin + rays.direction.scaled(hits.t);
+        let material = scene.material(&scene.objects[self.object], 0);
+        let mut normal = hits.normal;
+        let mut color = Vec3x8::splat(material.base_color);
+        let mut opacity = F32x8::splat(material.effective_opacity(material.opacity));
+        let is_form = matches!(*self.geometry, Geometry::Form(_));
+        for i in (0..LANES).filter(|&i| met.has(i)) {
+            points.material[i] = Some(material);
+            if is_form && material.texture.is_none() {
+                continue;
+            }
+            let local = self.object_from_world.transform_point3(position.get(i));
+            let place = self.place(local, normal.get(i), material);
+            let unit = place.normal.normalize_or_zero();
+            let (c, o) = scene.base_color(place.material, place.uv, local.as_vec3(), unit.as_vec3(), 0.0);
+            normal.set(i, place.normal);
+            color.set(i, c);
+            opacity.0[i] = place.material.effective_opacity(o);
+            points.material[i] = Some(place.material);
+        }
+        let turned = normal.turned(&self.normal_map);
+        let share = F64x8::splat(1.0) / turned.length();
+        let good = share.above(F64x8::ZERO) & F64x8::splat(f64::INFINITY).above(share);
+        let back = NOWHERE - rays.direction;
+        let unit = DVec3x8::pick(good, turned.scaled(share), back);
+        let away = unit.dot(rays.direction).above(F64x8::ZERO);
+        let facing = DVec3x8::pick(away, NOWHERE - unit, unit);
+        points.there = points.there | met;
+        points.position = DVec3x8::pick(met, position, points.position);
+        points.normal = DVec3x8::pick(met, facing, points.normal);
+        points.color = Vec3x8::pick(met, color, points.color);
+        points.opacity = met.pick(opacity, points.opacity);
+        points.hair = F64x8::pick(met, F64x8::splat(self.radius * 1e-5), points.hair);
+    }
+
+    /// Finds normal, coordinates and material of a point in object space; `normal` is that of a form.
+    fn place<'a>(&'a self, local: DVec3, normal: DVec3, material: &'a Material) -> Place<'a> {
+        match (&*self.geometry, &*self.shape) {
+            (Geometry::Form(_), Shape::Primitive(primitive)) => {
+                let uv = Some(primitive.uv(local, normal.normalize_or_zero()));
+                Place { normal, uv, material }
             }
             (Geometry::Plane { width, depth }, _) => {
                 let plane = Primitive::Plane { width: *width, depth: *depth };
-                uv = Some(plane.uv(local, DVec3::Y));
-                DVec3::Y
+                Place { normal: DVec3::Y, uv: Some(plane.uv(local, DVec3::Y)), material }
             }
             (Geometry::Heights(_), Shape::HeightField(heights)) => {
-                uv = Some(heights.uv(local.x, local.z));
-                heights.height_and_normal(local.x, local.z).1
+                let uv = Some(heights.uv(local.x, local.z));
+                Place { normal: heights.height_and_normal(local.x, local.z).1, uv, material }
             }
             (Geometry::Field(model), _) => {
-                let index = field::material(model, local);
-                slot_material = model.palette.get(index).unwrap_or(Material::fallback());
-                field::normal(model, local)
+                let material =
+                    model.palette.get(field::material(model, local)).unwrap_or(Material::fallback());
+                Place { normal: field::normal(model, local), uv: None, material }
             }
-            _ => DVec3::Y,
-        };
-        let unit = normal.normalize_or_zero();
-        let (color, opacity) = scene.base_color(slot_material, uv, local.as_vec3(), unit.as_vec3(), 0.0);
-        Point {
-            t,
-            position,
-            normal: (self.normal_map * normal).normalize_or(-direction),
-            material: slot_material,
-            color,
-            opacity: slot_material.effective_opacity(opacity),
+            _ => Place { normal, uv: None, material },
         }
     }
 }
 
-impl Body {
-    /// Returns the material at a point of the surface.
-    pub(crate) fn material_at<'a>(&'a self, scene: &'a Scene, position: DVec3) -> &'a Material {
-        match &*self.geometry {
-            Geometry::Field(model) => {
-                let local = self.object_from_world.transform_point3(position);
-                model.palette.get(field::material(model, local)).unwrap_or(Material::fallback())
-            }
-            _ => scene.material(&scene.objects[self.object], 0),
-        }
-    }
+/// What is known of a point in object space.
+struct Place<'a> {
+    normal: DVec3,
+    uv: Option<[f32; 2]>,
+    material: &'a Material,
 }

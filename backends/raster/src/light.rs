@@ -5,10 +5,10 @@ use crate::face::Face;
 use crate::model::Model;
 use crate::shadow::{Looks, Shadows, Sight};
 use glam::{DAffine3, DVec3, Vec3};
-use polyptych_core::lanes::{DVec3x8, F32x8, LANES, Mask8, Vec3x8};
+use polyptych_core::lanes::{DVec3x8, F32x8, LANES, Vec3x8};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{Arriving, Light, LightKind, Scene, Shape};
-use polyptych_core::shade::{Surfaces, turned_away};
+use polyptych_core::shade::{lit_by_material, turned_away};
 
 /// A light, made ready.
 pub(crate) struct Lamp {
@@ -130,24 +130,16 @@ impl Illumination<'_> {
     fn added(&self, batch: &Batch<'_>, arrivals: &Arrivals) -> [Vec3x8; OCTETS] {
         let mut added = [BLACK; OCTETS];
         for (o, added) in added.iter_mut().enumerate() {
-            let mut waiting: [_; LANES] = std::array::from_fn(|lane| {
+            let materials = std::array::from_fn(|lane| {
                 batch.material[o * LANES + lane].filter(|_| o * LANES + lane < batch.count)
             });
-            while let Some(material) = waiting.iter().flatten().next().copied() {
-                let (color, normal, to_eye) = (batch.color[o], batch.normal[o], batch.to_eye[o]);
-                let lit = Surfaces { material, color, normal, to_eye }.lit_by(
-                    self.scene.environment.lighting,
-                    arrivals.direction[o],
-                    arrivals.radiance[o],
-                );
-                let mut mask = Mask8::NONE;
-                for (lane, waits) in waiting.iter_mut().enumerate() {
-                    if waits.is_some_and(|m| std::ptr::eq(m, material)) {
-                        (*waits, mask.0[lane]) = (None, u32::MAX);
-                    }
-                }
-                *added = Vec3x8::pick(mask, lit, *added);
-            }
+            *added = lit_by_material(
+                materials,
+                (batch.color[o], batch.normal[o], batch.to_eye[o]),
+                self.scene.environment.lighting,
+                arrivals.direction[o],
+                arrivals.radiance[o],
+            );
         }
         added
     }

@@ -30,20 +30,26 @@ impl Contours {
         (self.width * 0.5).ceil() as u32 + 1
     }
 
-    /// Marks the edge pixels of a row.
-    pub(crate) fn mark_row(&self, picture: &Framebuffer, view: &View<'_>, y: u32, edges: &mut [bool]) {
-        edges.fill(false);
+    /// Lists the edge pixels of a row, from the left.
+    pub(crate) fn mark_row(&self, picture: &Framebuffer, view: &View<'_>, y: u32, edges: &mut Vec<u32>) {
+        edges.clear();
         let (width, height) = (picture.width(), picture.height());
-        for x in 0..width {
-            let here = (y * width + x) as usize;
-            let beside = |dx: i32, dy: i32| -> bool {
-                let (Some(u), Some(v)) = (x.checked_add_signed(dx), y.checked_add_signed(dy)) else {
-                    return false;
-                };
-                u < width && v < height && self.edge(picture, view, (x, y), (u, v))
+        let row = (y * width) as usize..((y + 1) * width) as usize;
+        for (x, &id) in (0..width).zip(&picture.id()[row]) {
+            if id == 0 {
+                continue;
+            }
+            let beside = |u: Option<u32>, v: Option<u32>| match (u, v) {
+                (Some(u), Some(v)) if u < width && v < height => self.edge(picture, view, (x, y), (u, v)),
+                _ => false,
             };
-            edges[x as usize] =
-                picture.id()[here] != 0 && (beside(1, 0) || beside(0, 1) || beside(-1, 0) || beside(0, -1));
+            if beside(Some(x + 1), Some(y))
+                || beside(Some(x), Some(y + 1))
+                || beside(x.checked_sub(1), Some(y))
+                || beside(Some(x), y.checked_sub(1))
+            {
+                edges.push(x);
+            }
         }
     }
 
@@ -78,16 +84,39 @@ impl Contours {
         !(off_a <= allowed || off_b <= allowed)
     }
 
-    /// Lays the lines of one row of edges over a row of coverage that is `dy` rows away.
-    pub(crate) fn splat_row(&self, edges: &[bool], dy: f32, coverage: &mut [f32]) {
+    /// Lays the lines of one row of edges over a piece of coverage that begins at a column, `dy` rows away.
+    pub(crate) fn splat_row(&self, edges: &[u32], dy: f32, first: usize, coverage: &mut [f32]) {
         let reach = self.reach() as usize;
-        for x in (0..edges.len()).filter(|&x| edges[x]) {
-            let last = (x + reach).min(edges.len() - 1);
-            for (u, cover) in coverage[..=last].iter_mut().enumerate().skip(x.saturating_sub(reach)) {
-                let dx = u as f32 - x as f32;
+        let begin = edges.partition_point(|&x| x as usize + reach < first);
+        let near = edges[begin..].iter().map(|&x| x as usize);
+        let end = first + coverage.len() + reach;
+        for x in near.take_while(|&x| x < end) {
+            let last = (x + reach + 1 - first).min(coverage.len());
+            let from = x.saturating_sub(first + reach);
+            for (u, cover) in coverage[..last].iter_mut().enumerate().skip(from) {
+                let dx = (first + u) as f32 - x as f32;
                 let line = self.width * 0.5 + 0.5 - (dx * dx + dy * dy).sqrt();
                 *cover = cover.max(line.clamp(0.0, 1.0));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_the_same_in_one_piece_and_in_many() {
+        let contours = Contours { drawn: true, width: 3.5, color: Vec3::ZERO, crease_cosine: 0.5 };
+        let edges = [0, 1, 14, 17, 33, 40, 63];
+        let mut whole = [0.0f32; 64];
+        contours.splat_row(&edges, 1.0, 0, &mut whole);
+        assert!(whole[14] > 0.9 && whole[25] == 0.0 && whole[63] > 0.9);
+        let mut pieces = [0.0f32; 64];
+        for (i, piece) in pieces.chunks_mut(16).enumerate() {
+            contours.splat_row(&edges, 1.0, i * 16, piece);
+        }
+        assert_eq!(whole, pieces);
     }
 }

@@ -148,8 +148,8 @@ pub struct Stylized {
     prepared: Option<(Arc<Scene>, Style)>,
     lights: Vec<Light>,
     visible: Framebuffer,
-    /// Edge pixels, one byte each, in rows.
-    edges: Vec<Vec<bool>>,
+    /// Columns of the edge pixels of each row.
+    edges: Vec<Vec<u32>>,
 }
 
 impl Stylized {
@@ -242,7 +242,7 @@ impl Renderer for Stylized {
         if (self.visible.width(), self.visible.height(), self.visible.channels()) != (width, height, channels)
         {
             self.visible = Framebuffer::new(width, height, channels);
-            self.edges = vec![vec![false; width as usize]; height as usize];
+            self.edges = (0..height).map(|_| Vec::with_capacity(width as usize)).collect();
         }
         let report = inner.render(frame, &mut self.visible, control)?;
         phases.end("visibility");
@@ -304,7 +304,7 @@ struct Painting<'a> {
     style: &'a Style,
     view: View<'a>,
     visible: &'a Framebuffer,
-    edges: &'a [Vec<bool>],
+    edges: &'a [Vec<u32>],
     light: Lighting<'a>,
 }
 
@@ -379,20 +379,23 @@ impl Painting<'_> {
     /// Lays the lines of the rows around over a row.
     fn lines(&self, y: u32, colors: &mut [Vec3]) {
         /// Pixels at once, on the stack: no memory is asked for while drawing.
-        const PIECE: usize = 256;
+        const PIECE: usize = 128;
         let contours = &self.style.contours;
         let reach = contours.reach();
         let rows = y.saturating_sub(reach)..(y + reach + 1).min(self.edges.len() as u32);
-        for first in (0..colors.len()).step_by(PIECE) {
-            let margin = reach as usize;
-            let (from, to) = (first.saturating_sub(margin), (first + PIECE + margin).min(colors.len()));
-            let mut coverage = [0.0f32; PIECE + 32];
-            let coverage = &mut coverage[..to - from];
+        if rows.clone().all(|row| self.edges[row as usize].is_empty()) {
+            return;
+        }
+        for (piece, colors) in colors.chunks_mut(PIECE).enumerate() {
+            let mut coverage = [0.0f32; PIECE];
+            let coverage = &mut coverage[..colors.len()];
             for row in rows.clone() {
-                contours.splat_row(&self.edges[row as usize][from..to], row as f32 - y as f32, coverage);
+                contours.splat_row(&self.edges[row as usize], row as f32 - y as f32, piece * PIECE, coverage);
             }
-            for (x, color) in colors.iter_mut().enumerate().take(first + PIECE).skip(first) {
-                *color = color.lerp(contours.color, coverage[x - from]);
+            for (color, &cover) in colors.iter_mut().zip(&*coverage) {
+                if cover > 0.0 {
+                    *color = color.lerp(contours.color, cover);
+                }
             }
         }
     }
