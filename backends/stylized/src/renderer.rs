@@ -258,7 +258,7 @@ impl Renderer for Stylized {
             Painting { scene, style, view, visible, edges: &self.edges, light: Lighting::of(&self.lights) };
         target.for_each_band(control.threads, ROWS, &|mut band| {
             if !control.is_cancelled() {
-                painting.band(&mut band);
+                painting.draw(&mut band);
                 control.finished(&band);
             }
         });
@@ -309,6 +309,27 @@ struct Painting<'a> {
 }
 
 impl Painting<'_> {
+    /// Paints a band with the widest registers there are; the bytes do not depend on them.
+    fn draw(&self, band: &mut Band<'_>) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.band_avx2(band) };
+        }
+        self.band(band);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn band_avx2(&self, band: &mut Band<'_>) {
+        self.band(band);
+    }
+
+    #[inline(always)]
     fn band(&self, band: &mut Band<'_>) {
         let from = band.first_row as usize * band.width as usize;
         let count = band.rows as usize * band.width as usize;
@@ -345,6 +366,7 @@ impl Painting<'_> {
         }
     }
 
+    #[inline(always)]
     fn pixel(&self, x: u32, y: u32, directions: Option<&RowDirections>) -> Vec3 {
         let i = (y * self.visible.width() + x) as usize;
         let ray = || self.view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);

@@ -6,6 +6,7 @@ use crate::world::Reach;
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection, View};
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
+use polyptych_core::lanes::{F64x8, I32x8, LANES};
 use polyptych_core::math::{Aabb, Ray};
 use polyptych_core::seam::Control;
 
@@ -96,6 +97,22 @@ impl<'a> Painter<'a> {
         true
     }
 
+    /// Sets up the rays of all pixels of a tile.
+    #[inline(always)]
+    fn rays(&self, tile: Tile, rays: &mut [Option<Ray>; TILE_RAYS]) {
+        for row in 0..tile.rows {
+            let y = f64::from(tile.first_row + row) + 0.5;
+            for column in (0..tile.columns).step_by(LANES) {
+                let x = I32x8::count_from((tile.first_column + column) as i32).to_f64() + F64x8::splat(0.5);
+                let (origin, direction, there) = self.view.rays(x, y);
+                for i in 0..LANES {
+                    let ray = Ray { origin: origin.get(i), direction: direction.get(i) };
+                    rays[(row * TILE + column) as usize + i] = there.has(i).then_some(ray);
+                }
+            }
+        }
+    }
+
     #[inline(always)]
     fn ray(&self, tile: Tile, x: u32, row: u32) -> Option<Ray> {
         self.view.ray(f64::from(x) + 0.5, f64::from(tile.first_row + row) + 0.5)
@@ -127,16 +144,19 @@ impl<'a> Painter<'a> {
     /// Draws a tile that sees nothing but background.
     #[inline(always)]
     fn empty_tile(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
-        let background = &tracer.world.scene.environment.background;
+        let background = tracer.world.scene.environment.background.gradient();
+        let mut rays = [None; TILE_RAYS];
+        self.rays(tile, &mut rays);
         let nothing = Pixel::background(Vec3::ZERO);
         for row in 0..tile.rows {
             let first = (row * band.width + tile.first_column) as usize;
             let pixels = first..first + tile.columns as usize;
             if self.wants.color {
-                for (x, color) in (tile.first_column..).zip(&mut band.color[pixels.clone()]) {
+                let rays = &rays[(row * TILE) as usize..];
+                for (ray, color) in rays.iter().zip(&mut band.color[pixels.clone()]) {
                     // Adding to zero drops the sign of -0, as adding up layers does.
-                    *color = self.ray(tile, x, row).map_or(Vec3::ZERO, |ray| {
-                        finite(Vec3::ZERO + background.color_at(ray.direction.y as f32))
+                    *color = ray.map_or(Vec3::ZERO, |ray| {
+                        finite(Vec3::ZERO + background.color(ray.direction.y as f32))
                     });
                 }
             }
@@ -157,9 +177,9 @@ impl<'a> Painter<'a> {
         let mut rays = [None; TILE_RAYS];
         let mut met = [None; TILE_RAYS];
         let mut sites = Aabb::EMPTY;
-        for (i, x, row) in tile.pixels() {
-            let Some(ray) = self.ray(tile, x, row) else { continue };
-            rays[i] = Some(ray);
+        self.rays(tile, &mut rays);
+        for (i, _, _) in tile.pixels() {
+            let Some(ray) = rays[i] else { continue };
             met[i] = tracer.world.meet_within(&ray, reach, &tracer.counts);
             if let Some(met) = &met[i] {
                 sites = tracer.world.with_site(sites, &ray, met);
@@ -168,11 +188,12 @@ impl<'a> Painter<'a> {
         let lights = self.lights(tracer, sites);
         let (mut seen, nothing) = (0, Pixel::background(Vec3::ZERO));
         for (i, x, row) in tile.pixels() {
-            let pixel = rays[i].map_or(nothing, |ray| {
-                seen += 1;
-                tracer.color(&ray, met[i], &lights, self.wants)
-            });
-            band.put(x, row, &pixel);
+            let Some(ray) = rays[i] else {
+                band.put(x, row, &nothing);
+                continue;
+            };
+            seen += 1;
+            band.put(x, row, &tracer.color(&ray, met[i], &lights, self.wants));
         }
         tracer.counts.rays.set(tracer.counts.rays.get() + seen);
     }

@@ -48,8 +48,18 @@ impl Tracer<'_> {
     }
 
     /// Does the same where the first surface is known; `lights` tell for some lamps what shadow rays may meet.
+    #[inline(always)]
     pub(crate) fn color(&self, ray: &Ray, met: Option<Met>, lights: &[Option<Reach>], wants: Wants) -> Pixel {
-        // Most rays are done with one opaque surface, or none.
+        if let Some(met) = met {
+            let point = self.world.point(ray, &met);
+            // Most rays are done with one opaque surface that is no mirror.
+            if point.opacity >= 1.0 && (self.bounces == 0 || point.material.reflectivity <= 0.0) {
+                let lit = self.light(&point, -ray.direction, lights, wants);
+                let color = if wants.color { lit.color } else { Vec3::ZERO };
+                let color = fogged(&self.world.scene.environment, color, met.place.t);
+                return Pixel { color: finite(Vec3::ZERO + color), ..seen(&point, met.place.t, lit.shadow) };
+            }
+        }
         self.follow(ray, Start::Eye, met, lights, wants, self.bounces, 1.0)
     }
 

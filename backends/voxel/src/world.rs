@@ -335,7 +335,13 @@ impl World {
         counts: &Counts,
     ) -> bool {
         if let Some(reach) = reach {
-            return reach.iter().any(|(i, span)| self.blocks(i, ray, site, before, Some(span), counts));
+            // A plain loop: what it calls is to be compiled for the processor at hand, too.
+            for (index, span) in reach.grids.iter().flatten() {
+                if self.blocks(*index as usize, ray, site, before, Some(span), counts) {
+                    return true;
+                }
+            }
+            return false;
         }
         let mut blocked = false;
         self.tree.visit(&WorldRay::new(*ray), before, &mut |index, before| {
