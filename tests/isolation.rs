@@ -158,6 +158,22 @@ fn nothing_that_a_plugin_does_ends_this_process() {
 }
 
 #[test]
+fn threads_that_a_plugin_leaves_behind_do_no_harm() {
+    let Some(library) = animal("threads") else { return };
+    let registry = registry_with(&library, &options());
+    let parameters = registry.info("animal").unwrap().parameters.clone();
+    let scene = builtin("polyhedra");
+    let mut studio = Studio::new(registry, 2).unwrap();
+    for fault in ["threads", "threads", "none"] {
+        let mut need = need(&scene, 64, 40);
+        need.settings.set("animal", &parameters, "fault", fault).unwrap();
+        let picture = studio.draw("animal", &scene, &need).unwrap().framebuffer;
+        // One number is written by those threads, now or later; all others are the plugin's.
+        assert!(picture.color()[1..].iter().all(|c| c.x == 0.25), "{fault}");
+    }
+}
+
+#[test]
 fn a_plugin_that_goes_on_when_it_was_stopped_is_ended() {
     let Some(library) = animal("stop") else { return };
     let registry = registry_with(&library, &options());

@@ -12,8 +12,13 @@ use std::process::Command;
 
 /// Runs checks against a plugin; returns the exit code and what was printed.
 fn validate(library: &Path, words: &[&str]) -> (Option<i32>, String) {
+    validate_with(library, words, "")
+}
+
+/// Does the same with a planted defect.
+fn validate_with(library: &Path, words: &[&str], defect: &str) -> (Option<i32>, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_polyptych"));
-    command.arg("validate").arg(library).args(words);
+    command.arg("validate").arg(library).args(words).env("POLYPTYCH_DEFECT", defect);
     let done = command.output().expect("the command starts");
     let text = [done.stdout, done.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
     (done.status.code(), text)
@@ -110,6 +115,35 @@ fn faults_are_named() {
         let (code, text) = validate(&library, &["--only", check, "--timeout", "4"]);
         assert_eq!(code, Some(4), "{fault}: {text}");
         assert!(text.starts_with(&format!("FAILED {check}: ")) && text.contains(words), "{fault}: {text}");
+    }
+}
+
+#[test]
+fn planted_defects_are_seen_and_shown() {
+    let library = built("polyptych_defects");
+    let out = folder("defects");
+    let words = ["--only", "picture", "-o", out.to_str().unwrap()];
+    // Edges may be off by a pixel: what moves nothing by more is harmless.
+    for harmless in ["none", "half-resolution"] {
+        let (code, text) = validate_with(&library, &words, harmless);
+        assert_eq!(code, Some(0), "{harmless}: {text}");
+    }
+    for defect in [
+        "missing-object",
+        "undrawn-tile",
+        "cracks",
+        "no-shadow",
+        "bright-light",
+        "shift",
+        "inverted-normals",
+        "swapped-channels",
+        "not-linear",
+    ] {
+        let (code, text) = validate_with(&library, &words, defect);
+        assert_eq!(code, Some(4), "{defect}: {text}");
+        let shown = text.split("see ").nth(1).and_then(|rest| rest.split([';', '\n']).next());
+        let shown = shown.unwrap_or_else(|| panic!("{defect}: {text}"));
+        assert!(Path::new(shown).exists(), "{defect}: {shown}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Does it show what the reference shows?
 
 use super::{Subject, drawing::draws, hold, scene};
+use crate::camera::Projection;
 use crate::compare::REFERENCE;
 use crate::framebuffer::{Channel, Framebuffer};
 use crate::metrics::{Errors, Gate};
@@ -11,12 +12,20 @@ use crate::seam::Need;
 /// tolerance, and where the report says that they are not.
 const SAME_OBJECT: [f64; 2] = [0.99, 0.9];
 
+/// Shares of the angle of view that are looked at: the whole scene with its outlines, and from near, so that what is
+/// wrong with the light is not thinned out by the background.
+const VIEWS: [f64; 2] = [1.0, 0.3];
+
 pub(super) fn picture(subject: &Subject) -> Result<(), String> {
     let photometric = subject.registry.info(&subject.backend).map_err(|e| e.to_string())?.photometric;
-    for name in ["polyhedra", "quadrics", "figure", "terrain"] {
+    let names = ["polyhedra", "quadrics", "figure", "terrain"];
+    for (name, view) in names.into_iter().flat_map(|name| VIEWS.map(|view| (name, view))) {
         let scene = scene(name)?;
         let need = Need { tolerance_px: 0.5, ..subject.need(&scene, 192, 108)? };
-        let need = Need { settings: Default::default(), ..need };
+        let mut need = Need { settings: Default::default(), ..need };
+        if let Projection::Perspective { fov_y } = &mut need.camera.projection {
+            *fov_y *= view;
+        }
         let mut studio = subject.studio(2)?;
         let drawing = studio.draw(&subject.backend, &scene, &need).map_err(|e| e.to_string())?;
         let reference = studio.draw(REFERENCE, &scene, &need).map_err(|e| e.to_string())?.framebuffer;

@@ -54,7 +54,14 @@ pub fn show(scene: Scene) -> Result<(), ViewerError> {
 /// # Errors
 /// When there is no display, or no threads can be started.
 pub fn show_with(registry: Registry, scene: Scene) -> Result<(), ViewerError> {
-    let viewer = Viewer::new(registry, scene)?;
+    show_viewer(Viewer::new(registry, scene)?)
+}
+
+/// Shows a viewer in a window, and returns when it is closed.
+///
+/// # Errors
+/// When there is no display.
+pub fn show_viewer(viewer: Viewer) -> Result<(), ViewerError> {
     let options = eframe::NativeOptions {
         viewport: eframe::egui::ViewportBuilder::default()
             .with_title("Polyptych")

@@ -1,33 +1,91 @@
-//! `polyptych-viewer [SCENE]`: opens a scene file, a model, or `builtin:NAME`, and shows it.
+//! `polyptych-viewer [--plugin-dir FOLDER]... [--trust-plugins] [SCENE]`: opens a scene file, a model, or
+//! `builtin:NAME`, and shows it.
 
-use polyptych_viewer::{open, show};
+use polyptych::BuiltinBackends;
+use polyptych::plugins::{self, Isolation, Options, PluginBackends, plugin_folders};
+use polyptych::seam::Registry;
+use polyptych_viewer::{Viewer, open, show_viewer};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// Exit code for a wrong call, as the command has it.
+const WRONG_USE: u8 = 2;
 /// Exit code for a refused input, as the command has it.
 const REFUSED: u8 = 3;
 
+const USAGE: &str = "polyptych-viewer [--plugin-dir FOLDER]... [--trust-plugins] [SCENE]: a scene file, a model, or \
+                     builtin:NAME";
+
+/// What was asked for.
+struct Arguments {
+    scene: String,
+    plugin_folders: Vec<PathBuf>,
+    trust_plugins: bool,
+}
+
+impl Arguments {
+    fn read(words: impl Iterator<Item = String>) -> Option<Self> {
+        let (mut scene, mut words) = (None, words);
+        let mut asked = Self { scene: String::new(), plugin_folders: Vec::new(), trust_plugins: false };
+        while let Some(word) = words.next() {
+            match word.as_str() {
+                "--plugin-dir" => asked.plugin_folders.push(words.next()?.into()),
+                "--trust-plugins" => asked.trust_plugins = true,
+                _ if word.starts_with('-') || scene.is_some() => return None,
+                _ => scene = Some(word),
+            }
+        }
+        asked.scene = scene.unwrap_or_else(|| "builtin:atelier".to_owned());
+        Some(asked)
+    }
+}
+
 fn main() -> ExitCode {
-    let arguments: Vec<_> = std::env::args().skip(1).collect();
-    let name = match &arguments[..] {
-        [] => "builtin:atelier",
-        [name] if !name.starts_with('-') => name,
-        _ => {
-            eprintln!("usage: polyptych-viewer [SCENE]: a scene file, a model, or builtin:NAME");
-            return ExitCode::from(2);
-        }
+    // A plugin's own process is this program, called anew.
+    plugins::serve();
+    let Some(arguments) = Arguments::read(std::env::args().skip(1)) else {
+        eprintln!("usage: {USAGE}");
+        return ExitCode::from(WRONG_USE);
     };
-    let scene = match open(name) {
-        Ok(scene) => scene,
-        Err(why) => {
-            eprintln!("error: {why}");
-            return ExitCode::from(REFUSED);
-        }
-    };
-    match show(scene) {
+    match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
+        Err((code, why)) => {
+            eprintln!("error: {why}");
+            ExitCode::from(code)
         }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), (u8, String)> {
+    if let Some(folder) = arguments.plugin_folders.iter().find(|folder| !folder.is_dir()) {
+        return Err((WRONG_USE, format!("--plugin-dir {}: there is no such folder", folder.display())));
+    }
+    let mut options = Options::default();
+    if arguments.trust_plugins {
+        options.isolation = Isolation::InProcess;
+    }
+    let folders: Vec<_> =
+        plugin_folders(&arguments.plugin_folders).into_iter().filter(|folder| folder.is_dir()).collect();
+    let mut registry = Registry::builtin();
+    let refused = registry.add_plugins(&folders, &options).map_err(|e| (REFUSED, e.to_string()))?;
+    let scene = open(&arguments.scene).map_err(|why| (REFUSED, why))?;
+    let mut viewer = Viewer::new(registry, scene).map_err(|e| (1, e.to_string()))?;
+    viewer.list_refused(refused.iter().map(ToString::to_string));
+    show_viewer(viewer).map_err(|e| (1, e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_read_or_refused() {
+        let read = |words: &[&str]| Arguments::read(words.iter().map(|w| (*w).to_owned()));
+        let asked = read(&["--plugin-dir", "a", "b.obj", "--plugin-dir", "c", "--trust-plugins"]).unwrap();
+        assert_eq!((asked.scene.as_str(), asked.trust_plugins), ("b.obj", true));
+        assert_eq!(asked.plugin_folders, [PathBuf::from("a"), PathBuf::from("c")]);
+        assert_eq!(read(&[]).unwrap().scene, "builtin:atelier");
+        assert!(read(&["--plugin-dir"]).is_none() && read(&["--wrong"]).is_none());
+        assert!(read(&["a", "b"]).is_none());
     }
 }

@@ -71,7 +71,7 @@ impl Pane {
     pub(crate) fn header(
         &mut self,
         ui: &mut egui::Ui,
-        backends: &[String],
+        (backends, refused): (&[String], &[String]),
         number: usize,
         scene: &Scene,
     ) -> bool {
@@ -82,6 +82,9 @@ impl Pane {
                 .show_ui(ui, |ui| {
                     for id in backends {
                         ui.selectable_value(&mut self.backend, id.clone(), id);
+                    }
+                    for line in refused {
+                        ui.add_enabled(false, egui::Button::new(line).wrap());
                     }
                 });
             name(&chosen.response, &format!("back end of pane {}", number + 1));

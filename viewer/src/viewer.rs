@@ -34,6 +34,8 @@ pub enum Mode {
 pub struct Viewer {
     registry: Registry,
     backends: Vec<String>,
+    /// Why plugins are not among them.
+    refused: Vec<String>,
     pool: Pool,
     converter: Arc<Converter>,
     scene: Arc<Scene>,
@@ -64,6 +66,7 @@ impl Viewer {
         Ok(Self {
             registry,
             backends,
+            refused: Vec::new(),
             pool: Pool::new(0).map_err(ViewerError::Threads)?,
             converter: Arc::default(),
             scene: Arc::new(scene),
@@ -77,6 +80,11 @@ impl Viewer {
             message: String::new(),
             shows_settings: false,
         })
+    }
+
+    /// Lists plugins that were refused, a line each, below the back ends that can be chosen.
+    pub fn list_refused(&mut self, lines: impl IntoIterator<Item = String>) {
+        self.refused.extend(lines);
     }
 
     /// Lists the back ends of the panes.
@@ -344,10 +352,10 @@ impl Viewer {
 
     fn show_pane(&mut self, ui: &mut egui::Ui, index: usize, cell: Rect) -> bool {
         let mut changed = false;
-        let (scene, backends) = (self.scene.clone(), &self.backends);
+        let (scene, backends, refused) = (self.scene.clone(), &self.backends, &self.refused);
         let pane = &mut self.panes[index];
         let header = ui.scope_builder(egui::UiBuilder::new().max_rect(cell), |ui| {
-            changed |= pane.header(ui, backends, index, &scene);
+            changed |= pane.header(ui, (backends, refused), index, &scene);
         });
         let top = header.response.rect.bottom() + 2.0;
         let picture = Rect::from_min_max(Pos2::new(cell.left(), top.min(cell.bottom())), cell.max);
@@ -372,7 +380,7 @@ impl Viewer {
         let mut top = rect.top();
         for (index, half) in halves.into_iter().enumerate() {
             let header = ui.scope_builder(egui::UiBuilder::new().max_rect(half), |ui| {
-                changed |= self.panes[index].header(ui, &self.backends, index, &scene);
+                changed |= self.panes[index].header(ui, (&self.backends, &self.refused), index, &scene);
             });
             top = top.max(header.response.rect.bottom() + 2.0);
         }

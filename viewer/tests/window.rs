@@ -149,3 +149,41 @@ fn what_cannot_be_opened_is_said_and_nothing_is_lost() {
     rest(&mut harness);
     assert_eq!(harness.state().scene().name, "quadrics");
 }
+
+/// A back end that is not what it says, as a plugin that crashes is: it panics in every call.
+struct Broken;
+
+impl polyptych::seam::BackendFactory for Broken {
+    fn info(&self) -> polyptych::seam::BackendInfo {
+        polyptych::seam::BackendInfo {
+            id: "broken".into(),
+            ..Registry::builtin().info("raster").unwrap().clone()
+        }
+    }
+    fn create(&self, _: &Registry) -> Box<dyn polyptych::seam::Renderer> {
+        panic!("as it was told")
+    }
+}
+
+#[test]
+fn a_back_end_that_fails_leaves_the_other_panes_alone() {
+    let mut registry = Registry::builtin();
+    registry.add(std::sync::Arc::new(Broken), polyptych::seam::Origin::BuiltIn);
+    let scene = polyptych::builtin::scene("polyhedra").unwrap();
+    let mut viewer = Viewer::new(registry, scene).unwrap();
+    viewer.list_refused(["liboops.so: is cut off".to_owned()]);
+    let mut harness = Harness::builder()
+        .with_size(Vec2::new(640.0, 360.0))
+        .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui), viewer);
+    rest(&mut harness);
+    let whole = colors(&harness, 1);
+    press(&mut harness, Key::Num6);
+    assert_eq!(harness.state().shown().next(), Some("broken"));
+    assert!(harness.query_by_label_contains("broken: it panicked").is_some(), "the pane says why");
+    assert_eq!(colors(&harness, 1), whole);
+    harness.get_by_label("back end of pane 1").click();
+    rest(&mut harness);
+    assert!(harness.query_by_label_contains("liboops.so: is cut off").is_some(), "refused ones are listed");
+    press(&mut harness, Key::Num1);
+    assert!(colors(&harness, 0) > 50, "the next back end draws");
+}
