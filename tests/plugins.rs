@@ -207,6 +207,18 @@ fn a_plugin_of_a_later_minor_version_draws() {
     assert!(drawing.prepared.objects.iter().all(|d| d.word() == "skipped"));
 }
 
+#[test]
+fn a_plugin_built_with_the_first_header_draws() {
+    // The header of version 1.0 stays as it was released, whatever the next ones add.
+    let library = folder("older").join(library_file("animal"));
+    let headers = format!("-I{}", source("plugins/fixtures/zoo").display());
+    let Some(()) = compiled(ZOO, &library, &["-DHEADER=\"polyptych_1_0.h\"", &headers]) else { return };
+    assert_eq!(open(&library).unwrap().abi, [1, 0]);
+    let scene = builtin("polyhedra");
+    let drawing = studio_with(&library).draw("animal", &scene, &need(&scene, 9, 9)).unwrap();
+    assert!(drawing.framebuffer.color().iter().all(|c| *c == Vec3::splat(0.25)));
+}
+
 /// Puts a library and its manifest into a folder.
 fn install(folder: &Path, name: &str) -> PathBuf {
     let library = folder.join(library_file(name));

@@ -1,5 +1,7 @@
 //! What the tests of plugins share: the libraries, and a C compiler.
 
+#![allow(dead_code, reason = "each test uses its own part")]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

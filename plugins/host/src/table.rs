@@ -33,6 +33,9 @@ unsafe impl Send for Loaded {}
 // SAFETY: as above.
 unsafe impl Sync for Loaded {}
 
+/// Bytes of the table in version 1.0.
+const LEAST: u32 = (std::mem::offset_of!(PolyptychPlugin, render) + size_of::<usize>()) as u32;
+
 /// Checks the table that a library returned.
 ///
 /// # Safety
@@ -51,7 +54,8 @@ pub(crate) unsafe fn check(path: &Path, table: *const PolyptychPlugin) -> Result
         let ours = format!("{}.{}", abi::POLYPTYCH_MAJOR, abi::POLYPTYCH_MINOR);
         return Err(Refusal::OtherMajor { path, major, minor, ours });
     }
-    let least = size_of::<PolyptychPlugin>() as u32;
+    // What version 1.0 had: later versions add behind it.
+    let least = LEAST;
     if size < least {
         return Err(Refusal::ShortTable { path, size, least });
     }
