@@ -165,8 +165,8 @@ fn what_is_no_fitting_plugin_is_refused_in_one_line() {
         ("NO_INSTANCE", "has no `create`"),
         ("NO_INFO", "there is nothing"),
         ("BAD_ID", "`Not an id!` is no id"),
-        ("SHORT_INFO", "`` is no id"),
-        ("SHORT_PARAMETER", "there is nothing"),
+        ("SHORT_INFO", "has 8 bytes, at least 56 are needed"),
+        ("SHORT_PARAMETER", "parameter 0: has 12 bytes, at least"),
     ];
     for (option, words) in cases {
         let library = folder.join(library_file(option));

@@ -33,8 +33,11 @@ unsafe impl Send for Loaded {}
 // SAFETY: as above.
 unsafe impl Sync for Loaded {}
 
-/// Bytes of the table in version 1.0.
-const LEAST: u32 = (std::mem::offset_of!(PolyptychPlugin, render) + size_of::<usize>()) as u32;
+/// Bytes of structs in version 1.0: later versions add behind them, and less cuts a field in two.
+const LEAST_TABLE: u32 = (std::mem::offset_of!(PolyptychPlugin, render) + size_of::<usize>()) as u32;
+const LEAST_INFO: u32 = (std::mem::offset_of!(PolyptychInfo, parameters) + size_of::<usize>()) as u32;
+const LEAST_PARAMETER: u32 =
+    (std::mem::offset_of!(PolyptychParameter, quality_axis) + size_of::<u32>()) as u32;
 
 /// Checks the table that a library returned.
 ///
@@ -54,8 +57,7 @@ pub(crate) unsafe fn check(path: &Path, table: *const PolyptychPlugin) -> Result
         let ours = format!("{}.{}", abi::POLYPTYCH_MAJOR, abi::POLYPTYCH_MINOR);
         return Err(Refusal::OtherMajor { path, major, minor, ours });
     }
-    // What version 1.0 had: later versions add behind it.
-    let least = LEAST;
+    let least = LEAST_TABLE;
     if size < least {
         return Err(Refusal::ShortTable { path, size, least });
     }
@@ -76,6 +78,7 @@ pub(crate) unsafe fn check(path: &Path, table: *const PolyptychPlugin) -> Result
     let wrong = |what: String| Refusal::WrongInfo { path: path.clone(), what };
     // SAFETY: the caller's promise.
     let flat = unsafe { abi::read(table.info) }.ok_or_else(|| wrong("there is nothing".to_owned()))?;
+    check_size(flat.size, LEAST_INFO).map_err(wrong)?;
     // SAFETY: the caller's promise.
     let info = unsafe { info(&flat) }.map_err(wrong)?;
     let accepts = kinds(flat.accepted_shapes);
@@ -131,6 +134,10 @@ pub(crate) fn is_id(id: &str) -> bool {
         && id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_')
 }
 
+fn check_size(size: u32, least: u32) -> Result<(), String> {
+    if size < least { Err(format!("has {size} bytes, at least {least} are needed")) } else { Ok(()) }
+}
+
 unsafe fn info(flat: &PolyptychInfo) -> Result<BackendInfo, String> {
     // SAFETY: the plugin's text, as the header says.
     let [id, name, version] = unsafe { [words(flat.id), words(flat.name), words(flat.version)] };
@@ -147,6 +154,7 @@ unsafe fn info(flat: &PolyptychInfo) -> Result<BackendInfo, String> {
         }
         // SAFETY: the plugin has as many parameters as it says.
         let Some(parameter) = (unsafe { abi::read(abi::element(flat.parameters, index)) }) else { continue };
+        check_size(parameter.size, LEAST_PARAMETER).map_err(|e| format!("parameter {index}: {e}"))?;
         // SAFETY: as above.
         let parameter =
             unsafe { self::parameter(&parameter) }.map_err(|e| format!("parameter {index}: {e}"))?;
