@@ -1,7 +1,15 @@
 //! Do the examples run, and does a new back end need nothing of another's files?
 
+#[path = "../examples/choose_a_backend.rs"]
+mod choose_a_backend;
 #[path = "../examples/write_a_backend.rs"]
 mod write_a_backend;
+
+#[test]
+fn a_back_end_is_chosen_by_what_it_can() {
+    choose_a_backend::main().unwrap();
+    assert_eq!(image::open("out/cloud.png").unwrap().to_rgb8().dimensions(), (480, 270));
+}
 
 #[test]
 fn a_back_end_is_written_in_one_file_and_draws() {

@@ -284,3 +284,42 @@ fn the_command_survives_a_plugin_that_crashes() {
         (&"raster".into(), Some(1))
     );
 }
+
+#[test]
+fn the_command_goes_on_after_every_misbehavior() {
+    let Some(library) = animal("every") else { return };
+    let dir = library.parent().unwrap();
+    let manifest = polyptych::plugins::Manifest::of(polyptych::plugins::open(&library).unwrap()).to_text();
+    std::fs::write(dir.join("animal.toml"), manifest).unwrap();
+    let run = |command: &str, backends: &str, fault: &str| {
+        let out = dir.join(if command == "render" { "a.png" } else { "compare" });
+        let set = format!("animal.fault={fault}");
+        let mut process = std::process::Command::new(env!("CARGO_BIN_EXE_polyptych"));
+        process.args([command, "builtin:polyhedra", "-b", backends, "--set", &set, "--size", "24x16"]);
+        process.args(["--plugin-limit", "1", "-o"]).arg(out).arg("--plugin-dir").arg(dir);
+        let done = process.output().unwrap();
+        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    let panels = || {
+        let text = std::fs::read_to_string(dir.join("compare/compare.json")).unwrap();
+        let numbers: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let panels = numbers["panels"].as_array().unwrap().clone();
+        panels.iter().map(|p| p["backend"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    // What fails is told in a line; what only draws nonsense is drawn.
+    let failing = "segfault abort exit overflow hang out-of-bounds prepare-segfault prepare-hang fail refuse \
+                   garbage-status";
+    let drawing = "nan leak sleep lie flicker unwritten threads";
+    for (faults, code) in [(failing, Some(1)), (drawing, Some(0))] {
+        for fault in faults.split_whitespace() {
+            let (ended, said) = run("render", "animal", fault);
+            assert_eq!(ended, code, "{fault}: {said}");
+            assert!(code == Some(0) || said.starts_with("error: animal: "), "{fault}: {said}");
+            let (ended, said) = run("compare", "raster,animal", fault);
+            assert_eq!(ended, code, "{fault}: {said}");
+            let expected: &[&str] = if code == Some(0) { &["raster", "animal"] } else { &["raster"] };
+            assert_eq!(panels(), expected, "{fault}: {said}");
+            assert_eq!(run("render", "animal", "none"), (Some(0), String::new()), "after {fault}");
+        }
+    }
+}

@@ -22,9 +22,11 @@ pub(crate) fn folder(name: &str) -> PathBuf {
     path
 }
 
-/// Returns a file of the project.
+/// Returns a file of the project, whichever of its packages is tested.
 pub(crate) fn source(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(file)
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = package.ancestors().find(|folder| folder.join("plugins/abi").is_dir());
+    root.unwrap_or(package).join(file)
 }
 
 /// Builds a plugin in C; nothing where there is no compiler, which CI has.

@@ -1,17 +1,26 @@
 //! Does the viewer do what its user asks, without a display?
 
+#[path = "../../tests/common/plugins.rs"]
+mod libraries;
+
 use eframe::egui::accesskit::Role;
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use libraries::{compiled, folder};
 use polyptych::BuiltinBackends;
+use polyptych::plugins::{Isolation, Limits, Options, PluginBackends};
 use polyptych::seam::Registry;
 use polyptych_viewer::{Mode, Viewer};
 use std::time::{Duration, Instant};
 
 fn window(scene: &str) -> Harness<'static, Viewer> {
+    window_with(Registry::builtin(), scene)
+}
+
+fn window_with(registry: Registry, scene: &str) -> Harness<'static, Viewer> {
     let scene = polyptych::builtin::scene(scene).unwrap();
-    let viewer = Viewer::new(Registry::builtin(), scene).unwrap();
+    let viewer = Viewer::new(registry, scene).unwrap();
     let mut harness = Harness::builder()
         .with_size(Vec2::new(640.0, 360.0))
         .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui), viewer);
@@ -169,13 +178,8 @@ impl polyptych::seam::BackendFactory for Broken {
 fn a_back_end_that_fails_leaves_the_other_panes_alone() {
     let mut registry = Registry::builtin();
     registry.add(std::sync::Arc::new(Broken), polyptych::seam::Origin::BuiltIn);
-    let scene = polyptych::builtin::scene("polyhedra").unwrap();
-    let mut viewer = Viewer::new(registry, scene).unwrap();
-    viewer.list_refused(["liboops.so: is cut off".to_owned()]);
-    let mut harness = Harness::builder()
-        .with_size(Vec2::new(640.0, 360.0))
-        .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui), viewer);
-    rest(&mut harness);
+    let mut harness = window_with(registry, "polyhedra");
+    harness.state_mut().list_refused(["liboops.so: is cut off".to_owned()]);
     let whole = colors(&harness, 1);
     press(&mut harness, Key::Num6);
     assert_eq!(harness.state().shown().next(), Some("broken"));
@@ -186,4 +190,37 @@ fn a_back_end_that_fails_leaves_the_other_panes_alone() {
     assert!(harness.query_by_label_contains("liboops.so: is cut off").is_some(), "refused ones are listed");
     press(&mut harness, Key::Num1);
     assert!(colors(&harness, 0) > 50, "the next back end draws");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn plugins_that_misbehave_do_so_in_their_own_pane() {
+    for (fault, words) in [
+        ("segfault", "`render` crashed: it touched memory that is not its own"),
+        ("overflow", "`render` crashed: it overflowed its stack"),
+        ("hang", "`render` crashed: it gave no sign for 0.4 s and was ended"),
+        ("out-of-bounds", "`render` crashed: it touched memory that is not its own"),
+        ("exit", "`render` crashed: it ended its process with code 0"),
+        ("prepare-segfault", "`prepare` crashed"),
+        ("fail", "it does not say why"),
+    ] {
+        let library = folder(&format!("viewer-{fault}")).join("libanimal.so");
+        let initial = format!("-DINITIAL=\"{fault}\"");
+        let Some(()) = compiled("plugins/fixtures/zoo/zoo.c", &library, &[&initial]) else { return };
+        let options = Options {
+            isolation: Isolation::Child { program: env!("CARGO_BIN_EXE_polyptych-viewer").into() },
+            limits: Limits { silence: Duration::from_millis(400), ..Limits::default() },
+            ..Options::default()
+        };
+        let mut registry = Registry::builtin();
+        registry.load_with(&library, &options).unwrap_or_else(|e| panic!("{e}"));
+        let mut harness = window_with(registry, "polyhedra");
+        let whole = harness.state().picture(1).unwrap().0.to_vec();
+        press(&mut harness, Key::Num6);
+        assert_eq!(harness.state().shown().next(), Some("animal"));
+        assert!(harness.query_by_label_contains(words).is_some(), "{fault}: the pane says what happened");
+        assert!(harness.state().picture(1).unwrap().0 == whole, "{fault}: the other pane is as it was");
+        press(&mut harness, Key::Num1);
+        assert!(colors(&harness, 0) > 50, "{fault}: the next back end draws");
+    }
 }
