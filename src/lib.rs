@@ -18,6 +18,7 @@
 pub use polyptych_core::{camera, convert, framebuffer, load, math, metrics, parallel, scene, seam, shade};
 
 pub mod builtin;
+pub mod chart;
 pub mod compare;
 pub mod conformance;
 pub mod export;

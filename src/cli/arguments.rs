@@ -18,6 +18,8 @@ pub(super) enum Command {
     Render(RenderArguments),
     /// Draw a scene with every back end beside the reference, with times and errors (the default).
     Compare(CompareArguments),
+    /// Chart error against time: every back end along its quality axes, over scenes.
+    Chart(ChartArguments),
     /// Tell what each back end would build and why; builds nothing.
     Plan(PlanArguments),
     /// Time frames.
@@ -56,6 +58,23 @@ pub(super) struct CompareArguments {
     /// End with code 4 unless every picture passes its gate.
     #[arg(long)]
     pub(super) gate: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct ChartArguments {
+    /// Scenes: files or builtin:NAME; all built-in ones when none is given.
+    #[arg(value_name = "SCENE")]
+    pub(super) scenes: Vec<String>,
+    #[command(flatten)]
+    pub(super) reading: ReadingArguments,
+    #[command(flatten)]
+    pub(super) draw: DrawArguments,
+    /// Folder to write to. A chart that was stopped goes on when it is started again with the same words.
+    #[arg(short, long, value_name = "DIR", default_value = "out/chart")]
+    pub(super) output: PathBuf,
+    /// Leave out how cost grows with triangles, voxels, functions, lights, pixels and threads.
+    #[arg(long)]
+    pub(super) no_growth: bool,
 }
 
 #[derive(Args, Debug)]

@@ -3,6 +3,7 @@
 mod arguments;
 mod backends;
 mod bench;
+mod chart;
 mod compare;
 mod convert;
 mod input;
@@ -55,6 +56,7 @@ pub(crate) fn run() -> ExitCode {
         None => compare::run(&arguments::CompareArguments::default()),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
+        Some(Command::Chart(arguments)) => chart::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Convert(arguments)) => convert::run(&arguments),

@@ -1,6 +1,8 @@
 //! What does a comparison leave on disk: a sheet, a page, numbers, and a picture for each panel?
 
+pub mod chart;
 mod page;
+pub(crate) mod plot;
 mod sheet;
 
 use crate::compare::{Comparison, Panel};
