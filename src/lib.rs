@@ -25,6 +25,7 @@ pub mod export;
 pub mod picture;
 pub mod plugins;
 pub mod report;
+pub mod stability;
 
 mod registry;
 mod studio;

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// An axis is left where a point took so long, or the next one would if cost goes on to grow as it did, milliseconds.
-const PATIENCE_MS: f64 = 4000.0;
+const PATIENCE_MS: f64 = 2500.0;
 
 /// Most combinations of a back end in a scene, and the time after which no more are tried, milliseconds.
 const COMBINATIONS: usize = 6;
@@ -100,12 +100,17 @@ impl Sweep<'_, '_> {
             let settings = with(&BTreeMap::new(), axis, value);
             let index = self.point(&settings)?;
             indices.push(index);
-            let point = &self.points[index];
             let first = self.points[indices[0]].fingerprint;
             if indices.len() == EQUAL && indices.iter().all(|&i| self.points[i].fingerprint == first) {
-                "changes nothing in this picture".clone_into(&mut note);
-                break;
+                // The other end tells whether the axis is idle or only begins late.
+                let end = axis.values.last().map(|v| with(&BTreeMap::new(), axis, v)).unwrap_or_default();
+                let end = self.point(&end)?;
+                if self.points[end].fingerprint == first {
+                    "changes nothing in this picture".clone_into(&mut note);
+                    break;
+                }
             }
+            let point = &self.points[index];
             let cost = |i: usize| self.points[i].prepare_ms + self.points[i].ms.median * 4.0;
             let growth = match indices[..] {
                 [.., before, last] if last > before => (cost(last) / cost(before)).max(1.0),

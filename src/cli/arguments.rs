@@ -20,6 +20,8 @@ pub(super) enum Command {
     Compare(CompareArguments),
     /// Chart error against time: every back end along its quality axes, over scenes.
     Chart(ChartArguments),
+    /// Sweep each way in which methods fail until they do; ends with code 4 where something got worse.
+    Stability(StabilityArguments),
     /// Tell what each back end would build and why; builds nothing.
     Plan(PlanArguments),
     /// Time frames.
@@ -75,6 +77,42 @@ pub(super) struct ChartArguments {
     /// Leave out how cost grows with triangles, voxels, functions, lights, pixels and threads.
     #[arg(long)]
     pub(super) no_growth: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct StabilityArguments {
+    /// Cases; all when none is given.
+    #[arg(value_name = "CASE")]
+    pub(super) cases: Vec<String>,
+    /// Back ends, separated by commas.
+    #[arg(short, long, value_name = "ID", value_delimiter = ',')]
+    pub(super) backend: Vec<String>,
+    /// Folder to write to.
+    #[arg(short, long, value_name = "DIR", default_value = "out/stability")]
+    pub(super) output: PathBuf,
+    /// End with code 4 where something breaks earlier than this file says.
+    #[arg(long, value_name = "LIMITS.md")]
+    pub(super) check: Option<PathBuf>,
+    /// Draw one value of a case, and tell its error and its worst pixel.
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    pub(super) at: Option<f64>,
+    /// With --at: take the better way.
+    #[arg(long, requires = "at")]
+    pub(super) better: bool,
+    /// With --at: tell about this pixel instead of the worst.
+    #[arg(long, value_name = "X,Y", requires = "at", value_parser = pixel)]
+    pub(super) pixel: Option<[u32; 2]>,
+    /// Threads; 0 = one for each core.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub(super) threads: u16,
+    #[command(flatten)]
+    pub(super) plugins: PluginArguments,
+    /// Print the outcomes as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Print no table.
+    #[arg(short, long)]
+    pub(super) quiet: bool,
 }
 
 #[derive(Args, Debug)]
@@ -308,6 +346,12 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once('x').ok_or_else(refuse)?;
     let parse = |s: &str| s.parse().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(refuse);
     Ok([parse(width)?, parse(height)?])
+}
+
+fn pixel(text: &str) -> Result<[u32; 2], String> {
+    let refuse = || "write X,Y with whole numbers".to_owned();
+    let (x, y) = text.split_once(',').ok_or_else(refuse)?;
+    Ok([x.trim().parse().map_err(|_| refuse())?, y.trim().parse().map_err(|_| refuse())?])
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {

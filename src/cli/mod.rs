@@ -9,6 +9,7 @@ mod convert;
 mod input;
 mod plan;
 mod render;
+mod stability;
 mod validate;
 
 use arguments::{Arguments, Command};
@@ -57,6 +58,7 @@ pub(crate) fn run() -> ExitCode {
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
         Some(Command::Chart(arguments)) => chart::run(&arguments),
+        Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Convert(arguments)) => convert::run(&arguments),

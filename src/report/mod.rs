@@ -4,6 +4,7 @@ pub mod chart;
 mod page;
 pub(crate) mod plot;
 mod sheet;
+pub mod stability;
 
 use crate::compare::{Comparison, Panel};
 use crate::framebuffer::Channel;

@@ -184,7 +184,7 @@ impl Plot {
     /// Writes the plot into an SVG.
     pub(crate) fn draw(&self, svg: &mut String, place: Place) {
         let (left, top) = (place.left + 62.0, place.top + 26.0);
-        let (width, height) = (place.width - 74.0, place.height - 72.0);
+        let (width, height) = (place.width - 88.0, place.height - 72.0);
         let strip = if self.y.zero.is_some() { STRIP } else { 0.0 };
         let x = |v: f64| left + self.x.at(v) * width;
         let y = |v: f64| {

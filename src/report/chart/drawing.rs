@@ -43,7 +43,7 @@ impl Grid {
 pub fn svg(chart: &Chart, measure: Measure) -> String {
     let shown = || chart.points.iter().filter(|p| measure.of(p).is_some());
     let times = log_range(shown().flat_map(|p| [p.ms.low, p.ms.high]));
-    let errors = log_range(shown().filter_map(|p| measure.of(p)).filter(|e| *e > 1e-9));
+    let errors = log_range(shown().filter_map(|p| measure.of(p)).filter(|e| *e > nothing(measure)));
     let grid = Grid::of(chart.scenes.len());
     let head = 84.0;
     let all = if chart.scenes.len() > 1 { 420.0 } else { 0.0 };
@@ -159,9 +159,19 @@ fn panel(chart: &Chart, scene: &str, measure: Measure, times: [f64; 2], errors: 
     Plot { title: scene.to_owned(), x, y, series, guides: guides(), levels: Vec::new() }
 }
 
-/// Errors that single precision cannot tell from none are shown as none.
+/// Returns the error below which there is none to be seen or told from rounding: for colors far below a step of a
+/// screen (4e-3), for the others that of single precision.
+fn nothing(measure: Measure) -> f64 {
+    match measure {
+        Measure::Color | Measure::Antialiased => 1e-5,
+        Measure::Distance => 3e-7,
+        Measure::NormalDeg => 1e-4,
+        Measure::Silhouette => 0.0,
+    }
+}
+
 fn shown_error(measure: Measure, point: &Point) -> f64 {
-    measure.of(point).filter(|e| *e > 1e-9).unwrap_or(0.0)
+    measure.of(point).filter(|e| *e > nothing(measure)).unwrap_or(0.0)
 }
 
 /// Draws the fronts of all scenes in one plot.
