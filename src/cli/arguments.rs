@@ -250,9 +250,15 @@ pub(super) struct ReadingArguments {
 /// How to draw: shared by all commands that draw.
 #[derive(Args, Debug, Default)]
 pub(super) struct DrawArguments {
-    /// Back ends, separated by commas.
+    /// Back ends, separated by commas; `auto` chooses one (render, compare, bench).
     #[arg(short, long, value_name = "ID", value_delimiter = ',')]
     pub(super) backend: Vec<String>,
+    /// For `auto`: the greatest color error (root mean square, full scale 1); the fastest that meets it is taken.
+    #[arg(long, value_name = "E")]
+    pub(super) max_error: Option<f64>,
+    /// For `auto`: the longest time of a frame; the most accurate that meets it is taken.
+    #[arg(long, value_name = "MS")]
+    pub(super) budget_ms: Option<f64>,
     /// Size of the picture.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<[u32; 2]>,

@@ -1,6 +1,7 @@
 //! The command: one file for each subcommand, and one place where errors become exit codes.
 
 mod arguments;
+mod auto;
 mod backends;
 mod bench;
 mod chart;

@@ -132,7 +132,7 @@ fn distances() -> Vec<Case> {
             values: powers(0, 7),
             counted: "share of wrong owners",
             build: scenes::depth,
-            better: Some(("as if from infinity", scenes::from_infinity)),
+            better: Some(("as if from infinity", scenes::flat_from_infinity)),
             ..base()
         },
     ]

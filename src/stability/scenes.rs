@@ -104,8 +104,17 @@ pub(super) fn far_camera(distance: f64) -> Setup {
 
 /// Draws from far away as if from infinity: the picture is the same, and no number is large.
 pub(super) fn from_infinity(setup: &mut Setup) {
+    parallel_beyond(setup, 3e3);
+}
+
+/// The same from nearer on: for what is flat and faces the eye.
+pub(super) fn flat_from_infinity(setup: &mut Setup) {
+    parallel_beyond(setup, 300.0);
+}
+
+fn parallel_beyond(setup: &mut Setup, least: f64) {
     let distance = setup.need.camera.eye.length();
-    if distance > 300.0
+    if distance > least
         && let Projection::Perspective { fov_y } = setup.need.camera.projection
     {
         setup.need.camera.projection =
