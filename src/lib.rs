@@ -17,13 +17,16 @@
 
 pub use polyptych_core::{camera, convert, framebuffer, load, math, metrics, parallel, scene, seam, shade};
 
+pub mod auto;
 pub mod builtin;
+pub mod chart;
 pub mod compare;
 pub mod conformance;
 pub mod export;
 pub mod picture;
 pub mod plugins;
 pub mod report;
+pub mod stability;
 
 mod registry;
 mod studio;

@@ -18,6 +18,10 @@ pub(super) enum Command {
     Render(RenderArguments),
     /// Draw a scene with every back end beside the reference, with times and errors (the default).
     Compare(CompareArguments),
+    /// Chart error against time: every back end along its quality axes, over scenes.
+    Chart(ChartArguments),
+    /// Sweep each way in which methods fail until they do; ends with code 4 where something got worse.
+    Stability(StabilityArguments),
     /// Tell what each back end would build and why; builds nothing.
     Plan(PlanArguments),
     /// Time frames.
@@ -56,6 +60,59 @@ pub(super) struct CompareArguments {
     /// End with code 4 unless every picture passes its gate.
     #[arg(long)]
     pub(super) gate: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct ChartArguments {
+    /// Scenes: files or builtin:NAME; all built-in ones when none is given.
+    #[arg(value_name = "SCENE")]
+    pub(super) scenes: Vec<String>,
+    #[command(flatten)]
+    pub(super) reading: ReadingArguments,
+    #[command(flatten)]
+    pub(super) draw: DrawArguments,
+    /// Folder to write to. A chart that was stopped goes on when it is started again with the same words.
+    #[arg(short, long, value_name = "DIR", default_value = "out/chart")]
+    pub(super) output: PathBuf,
+    /// Leave out how cost grows with triangles, voxels, functions, lights, pixels and threads.
+    #[arg(long)]
+    pub(super) no_growth: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct StabilityArguments {
+    /// Cases; all when none is given.
+    #[arg(value_name = "CASE")]
+    pub(super) cases: Vec<String>,
+    /// Back ends, separated by commas.
+    #[arg(short, long, value_name = "ID", value_delimiter = ',')]
+    pub(super) backend: Vec<String>,
+    /// Folder to write to.
+    #[arg(short, long, value_name = "DIR", default_value = "out/stability")]
+    pub(super) output: PathBuf,
+    /// End with code 4 where something breaks earlier than this file says.
+    #[arg(long, value_name = "LIMITS.md")]
+    pub(super) check: Option<PathBuf>,
+    /// Draw one value of a case, and tell its error and its worst pixel.
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    pub(super) at: Option<f64>,
+    /// With --at: take the better way.
+    #[arg(long, requires = "at")]
+    pub(super) better: bool,
+    /// With --at: tell about this pixel instead of the worst.
+    #[arg(long, value_name = "X,Y", requires = "at", value_parser = pixel)]
+    pub(super) pixel: Option<[u32; 2]>,
+    /// Threads; 0 = one for each core.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub(super) threads: u16,
+    #[command(flatten)]
+    pub(super) plugins: PluginArguments,
+    /// Print the outcomes as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Print no table.
+    #[arg(short, long)]
+    pub(super) quiet: bool,
 }
 
 #[derive(Args, Debug)]
@@ -193,9 +250,15 @@ pub(super) struct ReadingArguments {
 /// How to draw: shared by all commands that draw.
 #[derive(Args, Debug, Default)]
 pub(super) struct DrawArguments {
-    /// Back ends, separated by commas.
+    /// Back ends, separated by commas; `auto` chooses one (render, compare, bench).
     #[arg(short, long, value_name = "ID", value_delimiter = ',')]
     pub(super) backend: Vec<String>,
+    /// For `auto`: the greatest color error (root mean square, full scale 1); the fastest that meets it is taken.
+    #[arg(long, value_name = "E")]
+    pub(super) max_error: Option<f64>,
+    /// For `auto`: the longest time of a frame; the most accurate that meets it is taken.
+    #[arg(long, value_name = "MS")]
+    pub(super) budget_ms: Option<f64>,
     /// Size of the picture.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<[u32; 2]>,
@@ -289,6 +352,12 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once('x').ok_or_else(refuse)?;
     let parse = |s: &str| s.parse().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(refuse);
     Ok([parse(width)?, parse(height)?])
+}
+
+fn pixel(text: &str) -> Result<[u32; 2], String> {
+    let refuse = || "write X,Y with whole numbers".to_owned();
+    let (x, y) = text.split_once(',').ok_or_else(refuse)?;
+    Ok([x.trim().parse().map_err(|_| refuse())?, y.trim().parse().map_err(|_| refuse())?])
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {

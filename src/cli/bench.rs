@@ -1,7 +1,7 @@
 //! `polyptych bench`: how long does a frame take?
 
 use super::arguments::BenchArguments;
-use super::{Failure, input, print};
+use super::{Failure, auto, input, print};
 use glam::{DMat3, DVec3};
 use polyptych::camera::Camera;
 use polyptych::framebuffer::Framebuffer;
@@ -14,9 +14,14 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     let mut studio =
         input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
     let default = ["raster", "voxel", "freeform", "stylized"];
-    let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
+    let mut base = input::need(&arguments.draw, &scene)?;
+    let choice = auto::resolve(&arguments.draw, &mut studio, &scene, &base)?;
+    let backends = match &choice {
+        Some(choice) => vec![choice.chosen.backend.clone()],
+        None => input::backends(&arguments.draw, studio.registry(), &default)?,
+    };
+    base.tolerance_px = choice.as_ref().map_or(base.tolerance_px, |c| c.chosen.tolerance_px);
     let mut settings = input::settings(&arguments.draw, studio.registry(), &backends)?;
-    let base = input::need(&arguments.draw, &scene)?;
     let threads = studio.pool().count();
     let mut rows = Vec::new();
     for backend in &backends {
@@ -47,7 +52,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
             "backend": backend, "scene": scene.name, "width": need.width, "height": need.height,
             "threads": threads, "prepare_ms": prepare_ms, "frames": times.len(),
             "ms_median": at(0.5), "ms_min": at(0.0), "ms_p95": at(0.95),
-            "bytes": prepared.bytes, "settings": need.settings, "phases": phases, "counters": counters,
+            "bytes": prepared.bytes, "settings": need.settings, "phases": phases, "counters": counters, "auto": choice,
         }));
     }
     if arguments.draw.json {

@@ -1,7 +1,7 @@
 //! `polyptych compare`: every back end beside the reference.
 
 use super::arguments::CompareArguments;
-use super::{Failure, input, print};
+use super::{Failure, auto, input, print};
 use indicatif::{ProgressBar, ProgressStyle};
 use polyptych::compare::{Request, compare};
 use polyptych::report;
@@ -16,11 +16,16 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     let mut studio =
         input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
     let default = ["raster", "voxel", "freeform", "stylized"];
-    let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
+    let mut need = input::need(&arguments.draw, &scene)?;
+    let choice = auto::resolve(&arguments.draw, &mut studio, &scene, &need)?;
+    let backends = match &choice {
+        Some(choice) => vec![choice.chosen.backend.clone()],
+        None => input::backends(&arguments.draw, studio.registry(), &default)?,
+    };
+    need.tolerance_px = choice.as_ref().map_or(need.tolerance_px, |c| c.chosen.tolerance_px);
     let mut all = backends.clone();
     all.push(polyptych::compare::REFERENCE.to_owned());
     let settings = input::settings(&arguments.draw, studio.registry(), &all)?;
-    let need = input::need(&arguments.draw, &scene)?;
     let request = Request { backends, need, settings, frames: FRAMES };
 
     let bar = ProgressBar::new(request.backends.len() as u64 + 1);
@@ -39,10 +44,21 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     let command = std::env::args().collect::<Vec<_>>().join(" ");
     report::write(&comparison, &folder, &command).map_err(Failure::running)?;
     if arguments.draw.json {
-        print(&format!("{}\n", report::numbers(&comparison)));
+        let mut numbers = report::numbers(&comparison);
+        numbers["auto"] = serde_json::json!(choice);
+        print(&format!("{numbers}\n"));
     } else if !arguments.draw.quiet {
         print(&format!("{}\n", report::table(&comparison)));
         print(&format!("wrote {0}/index.html, {0}/sheet.png, {0}/compare.json\n", folder.display()));
+    }
+    if let Some(choice) = choice.filter(|_| !arguments.draw.quiet)
+        && let Some(panel) = comparison.panels.last()
+    {
+        let error = panel.errors.and_then(|e| e.color).map_or(0.0, |c| c.rmse);
+        eprintln!(
+            "auto: {} took {:.1} ms where {:.1} were expected, with an error of {error:.4} where {:.4} was expected",
+            panel.backend, panel.frame_ms, choice.chosen.predicted_ms, choice.chosen.predicted_error
+        );
     }
     if arguments.draw.verbose {
         for note in &comparison.notes {

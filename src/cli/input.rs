@@ -83,7 +83,15 @@ fn print_log(line: LogLine) {
 
 /// Returns the need of a picture, without settings.
 pub(super) fn need(arguments: &DrawArguments, scene: &Scene) -> Result<Need, Failure> {
-    let [width, height] = arguments.size.unwrap_or(SIZE);
+    need_of(arguments, scene, arguments.size.unwrap_or(SIZE))
+}
+
+/// Returns the need of a picture of a size, without settings.
+pub(super) fn need_of(
+    arguments: &DrawArguments,
+    scene: &Scene,
+    [width, height]: [u32; 2],
+) -> Result<Need, Failure> {
     let (tolerance, samples) = match arguments.quality.unwrap_or(Quality::Normal) {
         Quality::Draft => (2.0, 1),
         Quality::Normal => (0.5, 1),

@@ -1,13 +1,16 @@
 //! The command: one file for each subcommand, and one place where errors become exit codes.
 
 mod arguments;
+mod auto;
 mod backends;
 mod bench;
+mod chart;
 mod compare;
 mod convert;
 mod input;
 mod plan;
 mod render;
+mod stability;
 mod validate;
 
 use arguments::{Arguments, Command};
@@ -55,6 +58,8 @@ pub(crate) fn run() -> ExitCode {
         None => compare::run(&arguments::CompareArguments::default()),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
+        Some(Command::Chart(arguments)) => chart::run(&arguments),
+        Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Convert(arguments)) => convert::run(&arguments),

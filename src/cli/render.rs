@@ -1,7 +1,7 @@
 //! `polyptych render`: one picture.
 
 use super::arguments::RenderArguments;
-use super::{Failure, input, print};
+use super::{Failure, auto, input, print};
 use polyptych::framebuffer::Channels;
 use polyptych::picture;
 use polyptych::report::count_decisions;
@@ -12,7 +12,12 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let scene = input::scene(&arguments.scene)?;
     let mut studio =
         input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
-    let backends = input::backends(&arguments.draw, studio.registry(), &["raster"])?;
+    let base = input::need(&arguments.draw, &scene)?;
+    let choice = auto::resolve(&arguments.draw, &mut studio, &scene, &base)?;
+    let backends = match &choice {
+        Some(choice) => vec![choice.chosen.backend.clone()],
+        None => input::backends(&arguments.draw, studio.registry(), &["raster"])?,
+    };
     let [backend] = &backends[..] else {
         return Err(Failure::wrong_use("render draws with one back end: use `compare` for several"));
     };
@@ -20,7 +25,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let need = Need {
         channels: Channels::NONE.with(arguments.channel),
         settings: settings.remove(backend).unwrap_or_default(),
-        ..input::need(&arguments.draw, &scene)?
+        tolerance_px: choice.as_ref().map_or(base.tolerance_px, |c| c.chosen.tolerance_px),
+        ..base
     };
     let drawing = studio.draw(backend, &scene, &need).map_err(Failure::running)?;
     if arguments.output.as_os_str() == "-" {
@@ -34,7 +40,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
             "backend": backend, "width": need.width, "height": need.height,
             "prepare_ms": drawing.prepare_ms, "frame_ms": drawing.frame_ms,
             "bytes": drawing.prepared.bytes, "objects": count_decisions(&drawing.prepared.objects),
-            "out": arguments.output.to_string_lossy(),
+            "out": arguments.output.to_string_lossy(), "auto": choice,
         });
         print(&format!("{result}\n"));
     } else if !arguments.draw.quiet && arguments.output.as_os_str() != "-" {

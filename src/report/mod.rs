@@ -1,7 +1,10 @@
 //! What does a comparison leave on disk: a sheet, a page, numbers, and a picture for each panel?
 
+pub mod chart;
 mod page;
+pub(crate) mod plot;
 mod sheet;
+pub mod stability;
 
 use crate::compare::{Comparison, Panel};
 use crate::framebuffer::Channel;

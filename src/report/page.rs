@@ -58,7 +58,7 @@ fn panel(comparison: &Comparison, panel: &Panel) -> Value {
 }
 
 /// Names the processor.
-fn machine() -> String {
+pub(super) fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = info
@@ -72,7 +72,7 @@ fn machine() -> String {
 /// Returns the date as year-month-day, UTC.
 ///
 /// Source: H. Hinnant, *chrono-compatible low-level date algorithms*, 2013 (civil_from_days).
-fn today() -> String {
+pub(super) fn today() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     let days = (seconds / 86_400) as i64 + 719_468;
     let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));

@@ -56,13 +56,16 @@ fn info() -> BackendInfo {
         channels: Channels::ALL,
         photometric: false,
         parameters: vec![
-            parameter(
-                "visibility",
-                choice,
-                color(VISIBILITY[0]),
-                "",
-                "back end that finds the visible surfaces",
-            ),
+            Parameter {
+                quality_axis: true,
+                ..parameter(
+                    "visibility",
+                    choice,
+                    color(VISIBILITY[0]),
+                    "",
+                    "back end that finds the visible surfaces",
+                )
+            },
             parameter("tone.cool", ParameterKind::Color, color("#2a3f6b"), "", "color away from the light"),
             parameter("tone.warm", ParameterKind::Color, color("#c9a35c"), "", "color toward the light"),
             parameter("tone.alpha", share, Value::Float(0.25), "", "share of the own color on the cool side"),

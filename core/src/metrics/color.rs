@@ -23,6 +23,13 @@ pub struct ColorErrors {
     pub outliers: u64,
     /// Number of pixels in the largest connected group of those.
     pub largest_blob: u64,
+    /// Number of the reference's pixels outside of the range of the picture's 3x3 neighborhood: thin lines that are
+    /// missing, which the outliers of the picture do not show.
+    pub missing: u64,
+    /// Largest mean difference of a channel in a 16x16 tile over its standard error: what noise cannot explain.
+    pub worst_z: f64,
+    /// Number of outliers that stand out of the noise of their 16x16 tile, too.
+    pub loud: u64,
 }
 
 /// How far a channel must be outside of the neighborhood's range to count: eight steps of an 8-bit display,
@@ -31,6 +38,15 @@ const OUTLIER: f32 = 8.0 / 255.0;
 
 /// Edge of a tile.
 const TILE: usize = 32;
+
+/// Edge of a tile whose noise is measured.
+const NOISE_TILE: usize = 16;
+
+/// Standard deviation of a difference that has none: half of a step of an 8-bit display.
+const LEAST_NOISE: f64 = 0.5 / 255.0;
+
+/// Standard deviations beyond which a pixel is loud.
+const LOUD: f64 = 6.0;
 
 impl ColorErrors {
     pub(super) fn between(picture: &Framebuffer, reference: &Framebuffer) -> Self {
@@ -52,6 +68,7 @@ impl ColorErrors {
         let count = (width * height).max(1) as f64;
         let (rmse, sum) = differences(picture, reference);
         let outside = outliers(picture, reference, width, height);
+        let (worst_z, loud) = noise(picture, reference, &outside, width, height);
         let flip = flip_map(picture, reference, width, height);
         Self {
             rmse,
@@ -62,6 +79,9 @@ impl ColorErrors {
             worst_tile: worst_tile(picture, reference, width, height),
             outliers: outside.iter().filter(|&&o| o).count() as u64,
             largest_blob: largest_blob(&outside, width),
+            missing: outliers(reference, picture, width, height).iter().filter(|&&o| o).count() as u64,
+            worst_z,
+            loud,
         }
     }
 }
@@ -94,6 +114,43 @@ fn worst_tile(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize, height
         }
     }
     worst
+}
+
+/// Returns the largest mean difference of a tile in standard errors, and the number of outliers that are louder than
+/// the noise around them, whose strength the median of the differences tells.
+fn noise(
+    picture: &[[f32; 3]],
+    reference: &[[f32; 3]],
+    outside: &[bool],
+    width: usize,
+    height: usize,
+) -> (f64, u64) {
+    let (mut worst, mut loud) = (0.0_f64, 0);
+    let mut differences: [Vec<f64>; 3] = Default::default();
+    for y in (0..height).step_by(NOISE_TILE) {
+        for x in (0..width).step_by(NOISE_TILE) {
+            let rows = y..(y + NOISE_TILE).min(height);
+            let pixels = || rows.clone().flat_map(|v| v * width + x..v * width + (x + NOISE_TILE).min(width));
+            let mut strength = LEAST_NOISE;
+            for (channel, own) in differences.iter_mut().enumerate() {
+                own.clear();
+                own.extend(pixels().map(|i| f64::from(picture[i][channel] - reference[i][channel])));
+                let count = own.len() as f64;
+                let mean = own.iter().sum::<f64>() / count;
+                let variance = own.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / count;
+                worst = worst.max(mean.abs() / (variance.sqrt().max(LEAST_NOISE) / count.sqrt()));
+                own.iter_mut().for_each(|d| *d = d.abs());
+                let middle = own.len() / 2;
+                // The median of the sizes is 0.6745 standard deviations of a normal distribution.
+                strength = strength.max(*own.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745);
+            }
+            let far = |i: usize| {
+                (0..3).any(|c| f64::from((picture[i][c] - reference[i][c]).abs()) > LOUD * strength)
+            };
+            loud += pixels().filter(|&i| outside[i] && far(i)).count() as u64;
+        }
+    }
+    (worst, loud)
 }
 
 /// Marks pixels with a channel outside of what the reference shows in the 3x3 pixels around.

@@ -15,6 +15,10 @@ pub enum GateClass {
     Exact,
     /// Edges may be off by a pixel; surfaces must agree.
     EdgeTolerant,
+    /// There may be noise, but it must be noise: its mean in each part of the picture is zero.
+    Stochastic,
+    /// Lines and the borders of tones may be off by a pixel, but none may be missing.
+    Stylized,
 }
 
 /// Limits of a class.
@@ -34,6 +38,12 @@ pub struct Gate {
     pub largest_blob: u64,
     /// Smallest share of pixels off edges with the same id.
     pub id_agreement: f64,
+    /// Largest share of the reference's pixels that are missing in the picture.
+    pub missing_share: f64,
+    /// Largest mean difference of a tile in standard errors.
+    pub worst_z: f64,
+    /// Whether outliers must stand out of the noise around them to count.
+    pub forgives_noise: bool,
 }
 
 impl Gate {
@@ -46,6 +56,9 @@ impl Gate {
         outliers_always: 0,
         largest_blob: 0,
         id_agreement: 1.0,
+        missing_share: 0.0,
+        worst_z: 0.0,
+        forgives_noise: false,
     };
 
     /// Edges may be off by a pixel.
@@ -62,7 +75,29 @@ impl Gate {
         outliers_always: 8,
         largest_blob: 16,
         id_agreement: 0.999,
+        missing_share: 1.0,
+        worst_z: f64::INFINITY,
+        forgives_noise: false,
     };
+
+    /// Noise without bias.
+    ///
+    /// The limit of the z-test lies between the largest of 25,000 normal numbers (4.2: a picture of 1920x1080) and an
+    /// object of 4x4 pixels gone (7); noise widens tiles and blobs, so those are bounded by what is loud.
+    pub const STOCHASTIC: Self = Self {
+        class: GateClass::Stochastic,
+        largest_blob: u64::MAX,
+        worst_z: 6.0,
+        forgives_noise: true,
+        ..Self::EDGE_TOLERANT
+    };
+
+    /// Lines and tones.
+    ///
+    /// What may be missing lies between lines that moved by less than a pixel (0.0002) and one of 60 pixels that is
+    /// gone in 256x256 (0.0009).
+    pub const STYLIZED: Self =
+        Self { class: GateClass::Stylized, missing_share: 0.0006, ..Self::EDGE_TOLERANT };
 
     /// Decides about a picture of so many pixels; every limit that does not hold is named with its number.
     #[must_use]
@@ -86,9 +121,19 @@ impl Gate {
         if color.worst_tile > self.worst_tile {
             failed.push(format!("worst tile {:.4} > {}", color.worst_tile, self.worst_tile));
         }
-        let allowed = ((pixels as f64 * self.outlier_share) as u64).max(self.outliers_always);
-        if color.outliers > allowed {
-            failed.push(format!("outliers {} > {allowed}", color.outliers));
+        let allow = |share: f64| ((pixels as f64 * share) as u64).max(self.outliers_always);
+        let (outliers, word) =
+            if self.forgives_noise { (color.loud, "loud outliers") } else { (color.outliers, "outliers") };
+        let allowed = allow(self.outlier_share);
+        if outliers > allowed {
+            failed.push(format!("{word} {outliers} > {allowed}"));
+        }
+        let allowed = allow(self.missing_share);
+        if color.missing > allowed {
+            failed.push(format!("missing {} > {allowed}", color.missing));
+        }
+        if color.worst_z > self.worst_z {
+            failed.push(format!("worst z {:.1} > {}", color.worst_z, self.worst_z));
         }
         if color.largest_blob > self.largest_blob {
             failed.push(format!("largest blob {} > {}", color.largest_blob, self.largest_blob));

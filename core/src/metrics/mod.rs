@@ -44,6 +44,19 @@ impl Errors {
     /// When the sizes differ: pictures of one comparison always have one size.
     #[must_use]
     pub fn between(picture: &Framebuffer, reference: &Framebuffer) -> Self {
+        let mut errors = Self::of_geometry(picture, reference);
+        if picture.channels().has(Channel::Color) && reference.channels().has(Channel::Color) {
+            errors.color = Some(ColorErrors::between(picture, reference));
+        }
+        errors
+    }
+
+    /// Compares everything but color, which takes most of the time.
+    ///
+    /// # Panics
+    /// When the sizes differ: pictures of one comparison always have one size.
+    #[must_use]
+    pub fn of_geometry(picture: &Framebuffer, reference: &Framebuffer) -> Self {
         assert_eq!(
             (picture.width(), picture.height()),
             (reference.width(), reference.height()),
@@ -65,9 +78,6 @@ impl Errors {
             if both(Channel::Shadow) {
                 errors.shadow_agreement = Some(geometry::shadow_agreement(picture, reference, &same));
             }
-        }
-        if both(Channel::Color) {
-            errors.color = Some(ColorErrors::between(picture, reference));
         }
         errors
     }

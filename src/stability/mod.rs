@@ -1,0 +1,284 @@
+//! Where does each method fail: one parameter swept until the picture is wrong?
+//!
+//! Every case draws a small scene whose difficulty one number sets, with each back end and with the reference, and counts
+//! one kind of error. `breaks_at` is the first value at which the error passes the case's limit. Where a better way is
+//! known, it is swept too, and what it costs is told.
+
+mod cases;
+mod count;
+mod scenes;
+
+pub use cases::cases;
+
+use crate::compare::REFERENCE;
+use crate::framebuffer::{Channel, Framebuffer};
+use crate::picture::{displayed, encode};
+use crate::seam::{Need, Settings};
+use crate::studio::{Studio, StudioError};
+use count::{Count, Drawn};
+use scenes::Setup;
+use serde::Serialize;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// A way in which methods fail.
+pub struct Case {
+    /// Its name on the command line.
+    pub id: &'static str,
+    /// What is drawn, for people.
+    pub title: &'static str,
+    /// What is swept.
+    pub parameter: &'static str,
+    /// Values, easy ones first.
+    pub values: Vec<f64>,
+    /// Whether values are far apart and want a logarithmic axis.
+    pub is_logarithmic: bool,
+    /// Largest error that still counts as right.
+    pub limit: f64,
+    /// What the error is.
+    pub counted: &'static str,
+    /// Whether the back end is held against the reference's picture of its own model, where it has one: then only the
+    /// method counts, and not what was converted before.
+    pub is_method: bool,
+    /// Whether no value at all may break it.
+    pub is_promise: bool,
+    /// Ids of back ends that take part; others draw nothing that this case is about.
+    pub backends: &'static [&'static str],
+    build: fn(f64) -> Setup,
+    count: Count,
+    /// A better way and what changes in it.
+    better: Option<Better>,
+}
+
+/// A better way: what it is called, and what changes in a setup.
+type Better = (&'static str, fn(&mut Setup));
+
+/// What a sweep of one case with one back end found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// The case's name.
+    pub case: &'static str,
+    /// Id of the back end.
+    pub backend: String,
+    /// The better way, or nothing for the plain one.
+    pub method: Option<&'static str>,
+    /// What was swept.
+    pub parameter: &'static str,
+    /// Values up to the one after the break.
+    pub values: Vec<f64>,
+    /// Error at each.
+    pub error: Vec<f64>,
+    /// Time of a frame at each, milliseconds.
+    pub ms: Vec<f64>,
+    /// The first value at which the error passes the limit; nothing when none does.
+    pub breaks_at: Option<f64>,
+    /// Largest error that still counts as right.
+    pub limit: f64,
+    /// Whether what is promised holds: a promise never breaks, other cases break where they may.
+    pub passed: bool,
+    /// What went wrong besides: a panic, a refusal.
+    pub failure: Option<String>,
+    /// Pictures before and at the break (or at the last value), and the reference's at it, as JPEG.
+    #[serde(skip)]
+    pub pictures: Vec<(f64, Vec<u8>)>,
+}
+
+/// One value of a case, drawn and counted.
+pub struct Probe {
+    /// The error.
+    pub error: f64,
+    /// Time of a frame, milliseconds.
+    pub ms: f64,
+    /// The back end's picture, where a single one is compared.
+    pub picture: Option<Framebuffer>,
+    /// The reference's.
+    pub reference: Option<Framebuffer>,
+}
+
+impl Probe {
+    /// Returns the pixel that is most wrong: another object before another distance before another color.
+    #[must_use]
+    pub fn worst_pixel(&self) -> Option<[u32; 2]> {
+        let (a, b) = (self.picture.as_ref()?, self.reference.as_ref()?);
+        if (a.width(), a.height()) != (b.width(), b.height()) || a.color().is_empty() {
+            return None;
+        }
+        let off = |i: usize| {
+            let id = a.id().get(i) != b.id().get(i);
+            let far = |p: &Framebuffer| p.distance().get(i).copied().filter(|d| d.is_finite()).unwrap_or(0.0);
+            let distance = (far(a) - far(b)).abs() / far(b).max(1e-6);
+            f64::from(u8::from(id)) * 1e6
+                + f64::from(distance.min(1e3)) * 1e2
+                + f64::from((a.color()[i] - b.color()[i]).abs().max_element().min(1.0))
+        };
+        let worst = (0..a.color().len()).max_by(|&i, &j| off(i).total_cmp(&off(j)))?;
+        (off(worst) > 0.0).then(|| [worst as u32 % a.width(), worst as u32 / a.width()])
+    }
+}
+
+impl Case {
+    /// Draws one value with a back end.
+    ///
+    /// # Errors
+    /// When the back end refuses the scene or panics.
+    pub fn probe(
+        &self,
+        studio: &mut Studio,
+        backend: &str,
+        value: f64,
+        is_better: bool,
+    ) -> Result<Probe, String> {
+        let plain = (self.build)(value);
+        let mut own = (self.build)(value);
+        if let Some((_, change)) = self.better.filter(|_| is_better) {
+            change(&mut own);
+        }
+        // A panic is a finding here, and the other cases go on: the studio makes the renderer anew.
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            let first = || (self.build)(self.values[0]);
+            self.count.count(studio, backend, &own, &plain, &first, self.is_method)
+        }));
+        match result {
+            Ok(Ok(Drawn { error, ms, picture, reference })) => Ok(Probe { error, ms, picture, reference }),
+            Ok(Err(error)) => Err(error.to_string()),
+            Err(_) => Err("it panicked".to_owned()),
+        }
+    }
+
+    /// Sweeps the case with a back end until the value after the break.
+    #[must_use]
+    pub fn sweep(&self, studio: &mut Studio, backend: &str, is_better: bool) -> Outcome {
+        let mut outcome = Outcome {
+            case: self.id,
+            backend: backend.to_owned(),
+            method: self.better.filter(|_| is_better).map(|(name, _)| name),
+            parameter: self.parameter,
+            values: Vec::new(),
+            error: Vec::new(),
+            ms: Vec::new(),
+            breaks_at: None,
+            limit: self.limit,
+            passed: true,
+            failure: None,
+            pictures: Vec::new(),
+        };
+        let mut last: Option<(f64, Probe)> = None;
+        for &value in &self.values {
+            let probe = match self.probe(studio, backend, value, is_better) {
+                Ok(probe) => probe,
+                Err(failure) => {
+                    outcome.failure = Some(failure);
+                    Probe { error: f64::INFINITY, ms: 0.0, picture: None, reference: None }
+                }
+            };
+            outcome.values.push(value);
+            outcome.error.push(probe.error);
+            outcome.ms.push(probe.ms);
+            let is_broken = probe.error.is_nan() || probe.error > self.limit;
+            if outcome.breaks_at.is_some() {
+                break;
+            }
+            if is_broken {
+                outcome.breaks_at = Some(value);
+                outcome.pictures = last.iter().chain([&(value, probe)]).flat_map(pictures).collect();
+                last = None;
+                // A promise is tried to its end; elsewhere one value more shows how it goes on.
+                if self.is_promise {
+                    outcome.passed = false;
+                }
+            } else {
+                last = Some((value, probe));
+            }
+        }
+        if outcome.pictures.is_empty() {
+            outcome.pictures = last.iter().flat_map(pictures).collect();
+        }
+        outcome
+    }
+
+    /// Names the better way, where there is one.
+    #[must_use]
+    pub fn better(&self) -> Option<&'static str> {
+        self.better.map(|(name, _)| name)
+    }
+}
+
+fn pictures((value, probe): &(f64, Probe)) -> Vec<(f64, Vec<u8>)> {
+    let jpeg = |p: &Framebuffer| {
+        encode(&displayed(p, Channel::Color), p.width(), p.height(), "jpg").ok().map(|j| (*value, j))
+    };
+    probe.picture.iter().chain(&probe.reference).filter_map(jpeg).collect()
+}
+
+/// Sweeps cases with back ends, and their better ways; `progress` is told before each with the share that is done.
+pub fn stability(
+    studio: &mut Studio,
+    cases: &[Case],
+    backends: &[String],
+    progress: &mut dyn FnMut(usize, usize, &str),
+) -> Vec<Outcome> {
+    let runs: Vec<(&Case, &String, bool)> = cases
+        .iter()
+        .flat_map(|case| {
+            let takes =
+                move |b: &&String| case.backends.is_empty() || case.backends.iter().any(|id| id == *b);
+            backends.iter().filter(takes).flat_map(move |b| {
+                let plain = std::iter::once((case, b, false));
+                plain.chain(case.better.is_some().then_some((case, b, true)))
+            })
+        })
+        .collect();
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    for (i, (case, backend, is_better)) in runs.iter().enumerate() {
+        // What did not break needs no better way.
+        let is_idle = *is_better && outcomes.last().is_some_and(|o| o.breaks_at.is_none());
+        progress(i, runs.len(), &format!("{}: {backend}", case.id));
+        if !is_idle {
+            outcomes.push(case.sweep(studio, backend, *is_better));
+        }
+    }
+    outcomes
+}
+
+/// Draws a setup with a back end and all channels that are compared.
+fn draw(studio: &mut Studio, backend: &str, setup: &Setup) -> Result<(Framebuffer, f64), StudioError> {
+    let mut need: Need = setup.need.clone();
+    need.settings = Settings::default();
+    let info = studio.registry().info(backend)?.clone();
+    for (name, value) in &setup.settings {
+        // A better way is a setting of some back ends; others draw as they are.
+        let _ = need.settings.set(backend, &info.parameters, name, value);
+    }
+    let k = if backend == REFERENCE { 1 } else { setup.supersampling };
+    (need.width, need.height) = (need.width * k, need.height * k);
+    let drawing = studio.draw(backend, &setup.scene, &need)?;
+    Ok((drawing.framebuffer, drawing.frame_ms))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::BuiltinBackends as _;
+    use crate::seam::Registry;
+
+    #[test]
+    fn the_plain_method_breaks_far_from_the_origin_and_the_better_one_later() {
+        let all = cases();
+        let case = all.iter().find(|c| c.id == "far-from-origin").unwrap();
+        let mut studio = Studio::new(Registry::builtin(), 2).unwrap();
+        let plain = case.sweep(&mut studio, "raster", false);
+        let better = case.sweep(&mut studio, "raster", true);
+        let at = plain.breaks_at.unwrap_or(f64::INFINITY);
+        assert!(at >= 1e3, "{plain:?}");
+        assert!(better.breaks_at.unwrap_or(f64::INFINITY) >= at, "{better:?}");
+    }
+
+    #[test]
+    fn cases_have_names_of_their_own_and_begin_with_what_is_easy() {
+        let all = cases();
+        let mut names: Vec<_> = all.iter().map(|c| c.id).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), all.len());
+        assert!(all.iter().all(|c| c.values.len() >= 3 && c.limit >= 0.0));
+    }
+}
