@@ -160,7 +160,7 @@ fn nothing_that_a_plugin_does_ends_this_process() {
 #[test]
 fn threads_that_a_plugin_leaves_behind_do_no_harm() {
     let Some(library) = animal("threads") else { return };
-    let registry = registry_with(&library, &options());
+    let registry = registry_with(&library, &Options { limits: Limits::default(), ..options() });
     let parameters = registry.info("animal").unwrap().parameters.clone();
     let scene = builtin("polyhedra");
     let mut studio = Studio::new(registry, 2).unwrap();

@@ -380,7 +380,9 @@ pub(crate) mod tests {
 
     #[test]
     fn parabolas_have_their_first_roots() {
-        let cases: [(f64, f64, f64, Option<f64>, Option<f64>); LANES] = [
+        // Coefficients, and the first root of any kind and of those where the function rises.
+        type Case = (f64, f64, f64, Option<f64>, Option<f64>);
+        let cases: [Case; LANES] = [
             (-1.0, 0.0, 1.0, Some(-1.0), Some(-1.0)),
             (1.0, 0.0, -1.0, Some(-1.0), Some(1.0)),
             (0.0, 2.0, 1.0, Some(-0.5), Some(-0.5)),

@@ -3,13 +3,15 @@
 //!
 //! - [`Freeform`] draws primitives, free forms, height fields and volumes as given. Meshes and voxels are drawn
 //!   as the zero level of a grid of signed distances.
-//! - Roots are found by interval bounds along packets of rays ([`roots`](self)), so that the first one is never
-//!   missed except where a solid is thinner than a millionth of the ray's stretch through its bounds.
+//! - The rays of a tile are bounded together between two distances, which are halved while that is much longer than
+//!   the tile is wide; functions that cannot matter there are left out. A part that holds one quadric is solved in
+//!   closed form in double precision. Elsewhere roots are found by interval bounds along eight rays at once, so that
+//!   the first one is never missed except where a solid is thinner than a millionth of the stretch.
 //! - One sample a pixel, through its middle; mirrors are drawn as if they were not (and the report says so).
 //!
 //! Source: S. I. Vyatkin, *Complex surface modeling using perturbation functions*, Optoelectronics,
-//! Instrumentation and Data Processing 43(3), 2007; we bound each function by intervals on screen tiles instead of
-//! subdividing the whole space.
+//! Instrumentation and Data Processing 43(3), 2007; we subdivide screen tiles in depth, in perspective as it is,
+//! instead of a projected space.
 
 mod bundle;
 mod field;
