@@ -134,3 +134,41 @@ fn plans_build_nothing_and_name_what_is_built() {
         }
     }
 }
+
+#[test]
+fn planned_bytes_are_those_that_are_held() {
+    // Left out are converted free forms, whose meshes nobody can foresee without making them.
+    let cases = [
+        ("raster", "polyhedra"),
+        ("raster", "figure"),
+        ("raster", "terrain"),
+        ("voxel", "atelier"),
+        ("voxel", "polyhedra"),
+        ("voxel", "figure"),
+        ("voxel", "terrain"),
+        ("voxel", "cloud"),
+        ("freeform", "terrain"),
+        ("freeform", "cloud"),
+    ];
+    let mut off = Vec::new();
+    for (backend, name) in cases {
+        let scene = builtin(name);
+        let mut studio = studio(2);
+        let need = Need { width: 480, height: 270, ..need(&scene, Channels::COLOR) };
+        let planned = studio.renderer(backend).unwrap().plan(&scene, &need).bytes as f64;
+        let held = studio.prepare(backend, &scene, &need).unwrap().0.bytes as f64;
+        if !(0.9..=1.1).contains(&(planned / held)) {
+            off.push(format!("{backend}, {name}: {planned} planned, {held} held"));
+        }
+    }
+    assert!(off.is_empty(), "{}", off.join("\n"));
+}
+
+#[test]
+fn no_shadow_map_is_planned_or_held_where_nothing_blocks_light() {
+    let scene = builtin("cloud");
+    let mut studio = studio(2);
+    let need = need(&scene, Channels::COLOR);
+    assert!(!pass(&studio.renderer("raster").unwrap().plan(&scene, &need), "shadow map"));
+    assert!(studio.prepare("raster", &scene, &need).unwrap().0.bytes < 1 << 24);
+}
