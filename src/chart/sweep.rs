@@ -111,7 +111,7 @@ impl Sweep<'_, '_> {
                 }
             }
             let point = &self.points[index];
-            let cost = |i: usize| self.points[i].prepare_ms + self.points[i].ms.median * 4.0;
+            let cost = |i: usize| self.points[i].prepare_ms + self.points[i].ms.median * 3.0;
             let growth = match indices[..] {
                 [.., before, last] if last > before => (cost(last) / cost(before)).max(1.0),
                 _ => 1.0,

@@ -44,8 +44,9 @@ pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
         see_through(scene),
     ];
     let mut bytes: u64 = objects.iter().map(|o| o.bytes).sum();
+    let blocks = scene.objects.iter().any(|object| blocks_light(scene, object));
     for (index, lamp) in lamps.iter().enumerate() {
-        let pass = plan_map(index, lamp, need, options);
+        let pass = plan_map(index, lamp, need, options, blocks);
         if pass.needed {
             bytes += map_bytes(&lamp.light.kind, sizes);
         }
@@ -94,12 +95,20 @@ fn see_through(scene: &Scene) -> PassPlan {
     PassPlan { name: "see-through layers".to_owned(), needed, why: why.to_owned() }
 }
 
-fn plan_map(index: usize, lamp: &Lamp, need: &Need, options: Options) -> PassPlan {
+/// Tells whether an object can block light: volumes and what is see-through let it pass.
+fn blocks_light(scene: &Scene, object: &Object) -> bool {
+    why_skipped(object).is_none()
+        && !matches!(&*object.shape, Shape::Volume(_))
+        && (0..object.materials.len().max(1)).any(|slot| !scene.material(object, slot).is_see_through())
+}
+
+fn plan_map(index: usize, lamp: &Lamp, need: &Need, options: Options, blocks: bool) -> PassPlan {
     let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
     let (needed, why) = match (options.shadow, asked, lamp.light.casts_shadow) {
         (false, _, _) => (false, "shadows are switched off"),
         (_, false, _) => (false, "neither color nor shadow is asked for"),
         (_, _, false) => (false, "the light casts no shadow"),
+        _ if !blocks => (false, "nothing blocks light"),
         _ => (true, "the light casts shadows"),
     };
     PassPlan { name: format!("shadow map of light {index}"), needed, why: why.to_owned() }

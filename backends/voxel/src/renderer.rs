@@ -9,7 +9,7 @@ use crate::trace::{Shadows, Tracer};
 use crate::world::{Counts, Item, World};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
-use polyptych_core::scene::{AlphaMode, Chunk, Object, Scene, Shape, ShapeKind};
+use polyptych_core::scene::{AlphaMode, CHUNK, Chunk, Object, Scene, Shape, ShapeKind};
 use polyptych_core::seam::{
     BackendFactory, BackendInfo, Control, Counter, Decision, Frame, Need, ObjectPlan, Parameter,
     ParameterKind, PassPlan, Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Value,
@@ -282,5 +282,7 @@ fn plan_object(scene: &Scene, object: &Object, need: &Need, resolution: u32, is_
     let detail = model::detail(object, need, resolution);
     let forecast = Converter::default().voxels_forecast(scene, object, detail);
     let decision = model::converted(&object.shape, forecast.bound, &forecast.builds);
-    plan(decision, forecast.builds, forecast.bytes)
+    // The converter keeps the voxels, for all who ask; what is held here are masks of their chunks.
+    let chunks = forecast.bytes / u64::from(CHUNK).pow(3);
+    plan(decision, forecast.builds, chunks * size_of::<Occupancy>() as u64)
 }

@@ -156,7 +156,9 @@ fn panel(chart: &Chart, scene: &str, measure: Measure, times: [f64; 2], errors: 
             line_class: "front",
         });
     }
-    Plot { title: scene.to_owned(), x, y, series, guides: guides(), levels: Vec::new() }
+    // Of a file its name is enough here; the page's tables have the whole path.
+    let title = scene.rsplit(['/', '\\']).next().unwrap_or(scene).to_owned();
+    Plot { title, x, y, series, guides: guides(), levels: Vec::new() }
 }
 
 /// Returns the error below which there is none to be seen or told from rounding: for colors far below a step of a
