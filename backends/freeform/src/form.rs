@@ -378,6 +378,49 @@ pub(crate) mod tests {
         program.leaves.iter().map(|q| RayQuadric::new(&line.quadric(&q.0), reach)).collect()
     }
 
+    /// Casts rays at the figure that uses every step, with the widest registers and with the plainest.
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn bytes_do_not_depend_on_the_registers() {
+        if !std::arch::is_x86_feature_detected!("avx2") {
+            return;
+        }
+        let form = FreeForm::new(crate::program::tests::everything()).unwrap();
+        let body = FormBody::new(&form);
+        let mut rays = Vec::new();
+        for octet in 0..32 {
+            let (mut origin, mut direction) = (NOWHERE, NOWHERE);
+            for lane in 0..LANES {
+                let (x, y) = (f64::from(lane as u32) * 0.5 - 1.8, f64::from(octet) * 0.1 - 1.6);
+                let from = DVec3::new(0.4, 0.3, 4.0);
+                origin.set(lane, from);
+                direction.set(lane, (DVec3::new(x, y, 0.0) - from).normalize_or(DVec3::Z));
+            }
+            rays.push(Rays { origin, direction, near: F64x8::ZERO, far: F64x8::splat(9.0) });
+        }
+        let bits = |wide: bool, crossing: Crossing| {
+            let mut hits: Vec<Hits> = rays.iter().map(Hits::nothing).collect();
+            let mut scratch = FormScratch::default();
+            let place = DAffine3::from_rotation_y(0.3);
+            if wide {
+                body.cast(&place, 7, crossing, &rays, &mut hits, &mut scratch);
+            } else {
+                body.cast_plain(&place, 7, crossing, &rays, &mut hits, &mut scratch);
+            }
+            let numbers = |h: &Hits| {
+                let normal = h.normal;
+                (h.body.0, [h.t, normal.x, normal.y, normal.z].map(|v| v.0.map(f64::to_bits)))
+            };
+            hits.iter().map(numbers).collect::<Vec<_>>()
+        };
+        for crossing in [Crossing::Any, Crossing::Entry] {
+            let (wide, plain) = (bits(true, crossing), bits(false, crossing));
+            let met = wide.iter().flat_map(|h| h.0).filter(|b| *b == 7).count();
+            assert!(wide == plain, "{crossing:?}");
+            assert!((60..240).contains(&met), "{met} of 256");
+        }
+    }
+
     #[test]
     fn parabolas_have_their_first_roots() {
         // Coefficients, and the first root of any kind and of those where the function rises.
