@@ -14,11 +14,6 @@ fn powers(from: i32, to: i32) -> Vec<f64> {
     (0..=(to - from).abs()).map(|i| 10f64.powi(from + step * i)).collect()
 }
 
-/// Powers of eight from 1 on: conversions have classes of half octaves, and stay the same at such scales.
-fn eighths(to: i32) -> Vec<f64> {
-    (0..=to.abs()).map(|i| 8f64.powi(i * to.signum())).collect()
-}
-
 /// Returns all cases.
 #[must_use]
 pub fn cases() -> Vec<Case> {
@@ -80,7 +75,7 @@ fn distances() -> Vec<Case> {
             id: "tiny-scenes",
             title: "The same still life, smaller and smaller",
             parameter: "scale",
-            values: eighths(-9),
+            values: powers(0, -8),
             limit: 0.002,
             counted: "color difference to the picture at scale 1",
             backends: EVERY,
@@ -92,7 +87,7 @@ fn distances() -> Vec<Case> {
             id: "huge-scenes",
             title: "The same still life, larger and larger",
             parameter: "scale",
-            values: eighths(9),
+            values: powers(0, 8),
             limit: 0.002,
             counted: "color difference to the picture at scale 1",
             backends: EVERY,

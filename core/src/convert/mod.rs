@@ -1,8 +1,9 @@
 //! Turns any shape into triangles, voxels or a signed-distance grid: on demand, to a stated tolerance, once
 //! for all back ends, and with the error bound that was reached.
 //!
-//! Nothing is converted that no one asked for. Tolerances are grouped in classes half an octave wide; a
-//! result is kept under (shape, class) as long as the shape lives, and shared by all who ask again.
+//! Nothing is converted that no one asked for. Tolerances are grouped in classes half an octave wide, as shares of
+//! the body's size, so that a scene in other units becomes the same picture; a result is kept under (shape, class)
+//! as long as the shape lives, and shared by all who ask again.
 
 mod distance;
 mod field_mesh;
@@ -109,6 +110,24 @@ pub struct Detail {
     pub max_resolution: u32,
 }
 
+impl Detail {
+    /// Returns the class of the tolerance for an object, rounded down: half octaves of its share of the body's size.
+    /// What is converted is the same for all tolerances of a class.
+    #[must_use]
+    pub fn class(&self, object: &Object) -> i32 {
+        let share = self.tolerance / (scale_of(object) * extent_of(object));
+        if share > 0.0 && share.is_finite() { (share.log2() * 2.0 + 1e-9).floor() as i32 } else { i32::MIN }
+    }
+
+    /// Returns the tolerance of the class in object space.
+    fn in_object(&self, object: &Object) -> f64 {
+        match self.class(object) {
+            i32::MIN => 0.0,
+            class => 2f64.powf(f64::from(class) * 0.5) * extent_of(object),
+        }
+    }
+}
+
 impl Converter {
     /// Returns the shape of an object as triangles. Meshes are returned as they are.
     ///
@@ -122,8 +141,7 @@ impl Converter {
         threads: &dyn Threads,
     ) -> Result<Arc<MeshModel>, ConvertError> {
         let scale = scale_of(object);
-        self.meshes.get(scene, object, detail, |detail| {
-            let tolerance = detail.tolerance / scale;
+        self.meshes.get(scene, object, detail, |tolerance| {
             let (mesh, bound, why) = match &*object.shape {
                 Shape::Mesh(mesh) => (mesh.clone(), 0.0, "triangles as given".to_owned()),
                 Shape::Primitive(primitive) => {
@@ -174,8 +192,7 @@ impl Converter {
         threads: &dyn Threads,
     ) -> Result<Arc<VoxelModel>, ConvertError> {
         let scale = scale_of(object);
-        self.voxels.get(scene, object, detail, |detail| {
-            let tolerance = detail.tolerance / scale;
+        self.voxels.get(scene, object, detail, |tolerance| {
             let mut model = voxelize::voxelize(scene, object, tolerance, detail.max_resolution, threads)
                 .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
             model.bound *= scale;
@@ -198,8 +215,7 @@ impl Converter {
         let scale = scale_of(object);
         let half = Detail { tolerance: detail.tolerance * 0.5, ..detail };
         let surface = self.mesh(scene, object, half, threads)?;
-        self.distances.get(scene, object, detail, |detail| {
-            let tolerance = detail.tolerance / scale;
+        self.distances.get(scene, object, detail, |tolerance| {
             let mut model =
                 distance::of_mesh(scene, object, &surface.mesh, tolerance, detail.max_resolution, threads)
                     .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
@@ -215,7 +231,7 @@ impl Converter {
             return Forecast { bytes: model.mesh.bytes(), bound: model.bound, builds: model.why.clone() };
         }
         let scale = scale_of(object);
-        let tolerance = class_tolerance(detail.tolerance) / scale;
+        let tolerance = detail.in_object(object);
         let (triangles, bound) = match &*object.shape {
             Shape::Mesh(mesh) => (mesh.triangles.len() as f64, 0.0),
             Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
@@ -242,7 +258,7 @@ impl Converter {
             return Forecast { bytes: model.voxels.bytes(), bound: model.bound, builds: model.why.clone() };
         }
         let scale = scale_of(object);
-        let tolerance = class_tolerance(detail.tolerance) / scale;
+        let tolerance = detail.in_object(object);
         let (size, cell) = voxelize::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
         let chunks = size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>();
         let bytes = chunks * u64::from(crate::scene::CHUNK).pow(3);
@@ -258,7 +274,7 @@ impl Converter {
             return Forecast { bytes, bound: model.bound, builds: model.why.clone() };
         }
         let scale = scale_of(object);
-        let tolerance = class_tolerance(detail.tolerance) / scale;
+        let tolerance = detail.in_object(object);
         let (size, step) = distance::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
         let bytes = size.iter().map(|&s| u64::from(s)).product::<u64>() * 5;
         let [x, y, z] = size;
@@ -284,25 +300,15 @@ fn scale_of(object: &Object) -> f64 {
     if scale > 0.0 && scale.is_finite() { scale } else { 1.0 }
 }
 
+/// Returns the size of an object's shape, in object space: 1 where it has none.
+fn extent_of(object: &Object) -> f64 {
+    let size = object.shape.bounds().radius();
+    if size > 0.0 && size.is_finite() { size } else { 1.0 }
+}
+
 /// Tells for each palette byte whether light passes through.
 fn clear_values(scene: &Scene, object: &Object) -> [bool; 256] {
     std::array::from_fn(|v| v == 0 || scene.material(object, v - 1).is_see_through())
-}
-
-/// Rounds a tolerance down to its class: powers of the square root of two.
-fn class_of(tolerance: f64) -> i32 {
-    if tolerance > 0.0 && tolerance.is_finite() {
-        (tolerance.log2() * 2.0 + 1e-9).floor() as i32
-    } else {
-        i32::MIN
-    }
-}
-
-fn class_tolerance(tolerance: f64) -> f64 {
-    match class_of(tolerance) {
-        i32::MIN => 0.0,
-        class => 2f64.powf(f64::from(class) * 0.5),
-    }
 }
 
 /// Results by shape, class and the materials that went into them.
@@ -329,7 +335,7 @@ impl<T> Default for Cache<T> {
 
 impl<T> Cache<T> {
     fn key(object: &Object, detail: Detail) -> Key {
-        (Arc::as_ptr(&object.shape) as usize, class_of(detail.tolerance), detail.max_resolution)
+        (Arc::as_ptr(&object.shape) as usize, detail.class(object), detail.max_resolution)
     }
 
     fn find(&self, scene: &Scene, object: &Object, detail: Detail) -> Option<Arc<T>> {
@@ -347,7 +353,7 @@ impl<T> Cache<T> {
         scene: &Scene,
         object: &Object,
         detail: Detail,
-        make: impl FnOnce(Detail) -> Result<T, ConvertError>,
+        make: impl FnOnce(f64) -> Result<T, ConvertError>,
     ) -> Result<Arc<T>, ConvertError> {
         if let Some(model) = self.find(scene, object, detail) {
             return Ok(model);
@@ -355,7 +361,7 @@ impl<T> Cache<T> {
         if let Some(reason) = object.why_undrawable() {
             return Err(ConvertError { object: object.name.clone(), reason: reason.to_owned() });
         }
-        let model = Arc::new(make(Detail { tolerance: class_tolerance(detail.tolerance), ..detail })?);
+        let model = Arc::new(make(detail.in_object(object))?);
         let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
         entries.retain(|_, list| {
             list.retain(|e| e.shape.strong_count() > 0);
@@ -416,6 +422,24 @@ mod tests {
         let large = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
         assert!(large.bound <= 0.01, "{}", large.bound);
         assert!(large.mesh.triangles.len() > 20 * small.mesh.triangles.len());
+    }
+
+    #[test]
+    fn the_same_body_in_other_units_becomes_the_same_triangles() {
+        let (scene, object) = ball();
+        let converter = Converter::default();
+        let triangles = |unit: f64| {
+            let mut object = object.clone();
+            object.world_from_object = DAffine3::from_scale(DVec3::splat(unit));
+            let detail = Detail { tolerance: 0.0123 * unit, max_resolution: 64 };
+            let model = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+            assert!(model.bound <= 0.0123 * unit);
+            model.mesh.positions.clone()
+        };
+        let meters = triangles(1.0);
+        for power in -12..=12 {
+            assert!(triangles(10f64.powi(power)) == meters, "10^{power}");
+        }
     }
 
     #[test]
