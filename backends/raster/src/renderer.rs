@@ -246,7 +246,14 @@ impl Renderer for Raster {
         let mut work = Work { phases: Phases::start(), triangles: 0, shaded: 0 };
         let near = ready.near(&frame.camera);
         match Lens::of_camera(&frame.camera, width, height, near) {
-            Some(lens) => self.scratch.draw(ready, &lens, target, Announce::Yes, &mut work, control)?,
+            Some(lens) => self.scratch.draw(
+                ready,
+                &lens.with_depths_of(&ready.model.bounds),
+                target,
+                Announce::Yes,
+                &mut work,
+                control,
+            )?,
             None => self.scratch.draw_bent(ready, &frame.camera, target, &mut work, control)?,
         }
         let mut counters = [None; 6];
@@ -304,7 +311,7 @@ impl Scratch {
         let edge = self.faces.reserve(&view, width, height, target.channels());
         let needed = needed(camera, width, height, control.threads);
         for face in (0..6).filter(|face| needed >> face & 1 == 1) {
-            let lens = face_lens(camera, face, edge, ready.near(camera));
+            let lens = face_lens(camera, face, edge, ready.near(camera)).with_depths_of(&ready.model.bounds);
             let buffers = (&mut self.vertices, &mut self.bins, &mut self.bands);
             let picture = self.faces.picture(face);
             draw(ready, &lens, picture, Announce::No, work, control, buffers)?;

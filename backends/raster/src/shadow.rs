@@ -363,14 +363,16 @@ fn lenses(kind: &LightKind, sizes: MapSizes, bounds: &Aabb, origin: DVec3) -> Ve
             let Some(edge) = local else { return Vec::new() };
             let position = position - origin;
             let scale = f64::from(edge.saturating_sub(4).max(1)) * 0.5 / outer.max(1e-3).tan();
-            vec![Lens::central(position, looking(direction), scale, [edge; 2], near(position))]
+            let lens = Lens::central(position, looking(direction), scale, [edge; 2], near(position));
+            vec![lens.with_depths_of(bounds)]
         }
         LightKind::Point { position } | LightKind::Spot { position, .. } => {
             let Some(edge) = local else { return Vec::new() };
             let position = position - origin;
             // Two texels more than a right angle on each side: the four texels of a place lie on one face.
             let scale = f64::from(edge.saturating_sub(4).max(1)) * 0.5;
-            (0..6).map(|i| Lens::central(position, cube_axes(i), scale, [edge; 2], near(position))).collect()
+            let face = |i| Lens::central(position, cube_axes(i), scale, [edge; 2], near(position));
+            (0..6).map(|i| face(i).with_depths_of(bounds)).collect()
         }
     }
 }
