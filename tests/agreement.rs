@@ -84,3 +84,28 @@ fn the_voxel_walk_has_no_error_of_its_own() {
         assert!(errors.color.is_some_and(|c| c.rmse < 1e-3), "{path}: {:?}", errors.color);
     }
 }
+
+#[test]
+fn a_camera_given_as_a_table_of_directions_is_drawn_by_every_back_end() {
+    // A curved screen: a turn of 2 radians from left to right, bent upward in the middle.
+    let (columns, rows) = (17u32, 9u32);
+    let directions = (0..columns * rows).map(|i| {
+        let [u, v] = [f64::from(i % columns) / 16.0 - 0.5, f64::from(i / columns) / 8.0 - 0.5];
+        DVec3::new((2.0 * u).sin(), -v - 0.3 * u * u, -(2.0 * u).cos())
+    });
+    let table = polyptych::camera::WarpTable::new(columns, rows, directions.collect()).unwrap();
+    let mut scene = (*builtin("polyhedra")).clone();
+    scene.cameras[0].1.projection = Projection::Warp(Arc::new(table));
+    // Raster copies the nearest pixel of a face of a cube, at most a third of a pixel away.
+    let scene = Arc::new(scene);
+    let need = need(&scene, 320, 180);
+    let mut studio = studio(2);
+    let reference = studio.draw("reference", &scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
+    let drawn = reference.id().iter().filter(|id| **id != 0).count();
+    assert!(drawn > 5000 && drawn < 320 * 180, "{drawn} pixels show something");
+    for (backend, least) in [("raster", 0.98), ("freeform", 0.995), ("stylized", 0.98)] {
+        let picture = studio.draw(backend, &scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
+        let agreement = Errors::between(&picture, &reference).id_agreement.unwrap_or(0.0);
+        assert!(agreement >= least, "{backend}: {agreement} of the pixels show the same object");
+    }
+}

@@ -196,3 +196,58 @@ fn refusals_are_one_line_with_the_code_of_their_kind() {
         assert_eq!(polyptych(wrong).status.code(), Some(2), "{wrong:?}");
     }
 }
+
+#[test]
+fn height_maps_are_read_from_tiff_as_from_png() {
+    let out = folder("tiff");
+    let heights = image::ImageBuffer::from_fn(24, 16, |x, y| {
+        let hill = 9000.0 * ((f64::from(x) * 0.4).sin() + (f64::from(y) * 0.3).cos() + 2.0);
+        image::Luma([hill as u16])
+    });
+    let pictures = ["map.png", "map.tif"].map(|name| {
+        let (map, picture) = (out.join(name), out.join(format!("{name}.pfm")));
+        heights.save(&map).unwrap();
+        let done = polyptych(&[
+            "render",
+            text(&map),
+            "--height-map",
+            "-b",
+            "freeform",
+            "--size",
+            "64x36",
+            "-o",
+            text(&picture),
+        ]);
+        assert_eq!(done.status.code(), Some(0), "{name}: {}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read(picture).unwrap()
+    });
+    assert!(pictures[0] == pictures[1] && pictures[0].len() > 64 * 36 * 12);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_program_and_leaves_whole_files_only() {
+    let out = folder("interrupt");
+    let mut running = Command::new(env!("CARGO_BIN_EXE_polyptych"))
+        .args(["compare", "--size", "3840x2160", "-o", text(&out)])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let sent = std::time::Instant::now();
+    assert!(Command::new("kill").args(["-INT", &running.id().to_string()]).status().unwrap().success());
+    running.wait().unwrap();
+    eprintln!("stopped {:.1} ms after the interrupt", sent.elapsed().as_secs_f64() * 1e3);
+    let output = running.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.trim_end().ends_with("error: interrupted"), "{message}");
+    assert!(output.stdout.is_empty());
+    assert_eq!(
+        std::fs::read_dir(&out).map_or(0, Iterator::count),
+        0,
+        "something was left in {}",
+        out.display()
+    );
+}

@@ -2,6 +2,7 @@
 //! the widest registers there are.
 
 use crate::face::{Face, Place};
+use crate::info::Shading;
 use crate::lens::Lens;
 use crate::model::Model;
 use glam::{DVec3, Vec3};
@@ -34,6 +35,8 @@ pub(crate) struct Batch<'a> {
     pub(crate) tag: [u32; BATCH],
     /// Along the ray, in lengths of its direction.
     t: [f64; BATCH],
+    /// Of the triangle's second and third corner.
+    pub(crate) weights: [[f32; 2]; BATCH],
     /// Along the ray, meters.
     pub(crate) distance: [f64; BATCH],
     /// Relative to the lens's origin, never outside of the triangle.
@@ -71,6 +74,7 @@ impl Batch<'_> {
             face: [0; BATCH],
             tag: [0; BATCH],
             t: [1.0; BATCH],
+            weights: [[0.0; 2]; BATCH],
             distance: [1.0; BATCH],
             place: [DVec3x8::splat(DVec3::ZERO); OCTETS],
             true_normal: [DVec3x8::splat(DVec3::ZERO); OCTETS],
@@ -98,16 +102,25 @@ impl Batch<'_> {
 impl<'a> Batch<'a> {
     /// Finds the surface points of all samples.
     #[inline(always)]
-    pub(crate) fn resolve(&mut self, scene: &'a Scene, model: &Model, lens: &Lens, faces: &[Face], ask: Ask) {
+    pub(crate) fn resolve(
+        &mut self,
+        scene: &'a Scene,
+        model: &Model,
+        lens: &Lens,
+        faces: &[Face],
+        (ask, shading): (Ask, Shading),
+    ) {
         let (mut held, mut any_held) = ([DVec3::NAN; BATCH], false);
         for i in 0..self.count {
             let (face, x, y) = (&faces[usize::from(self.face[i])], self.x[i], self.y[i]);
             let met = face.meet(lens, x, y);
             self.t[i] = met.t;
+            self.weights[i] = [met.weights[1] as f32, met.weights[2] as f32];
             if let Some(place) = met.held {
                 (held[i], any_held) = (place, true);
             }
-            let (normal, outward) = (face.normal(&met), face.outward);
+            let outward = face.outward;
+            let normal = if shading == Shading::Flat { outward.as_vec3() } else { face.normal(&met) };
             let (normal, outward) = if met.from_within { (-normal, -outward) } else { (normal, outward) };
             self.normal[i / LANES].set(i % LANES, normal);
             self.true_normal[i / LANES].set(i % LANES, outward);

@@ -7,14 +7,14 @@ use crate::clip::clip;
 use crate::lens::{Lens, ScreenFromObject};
 use crate::model::{Class, Model, Part, Role};
 use crate::setup::{DepthPlane, Record, ScreenPoint, Sides};
-use crate::tile::TileGrid;
+use crate::tile::{Placed, TileGrid};
 use crate::transform::{ScreenVertex, border};
 use polyptych_core::parallel::{Threads, for_each_mut};
 use std::ops::Range;
 
 /// Most runs: enough for a few times as many threads as there usually are.
-const MOST_RUNS: usize = 32;
-/// Triangles that are worth a run of their own.
+pub(crate) const RUNS: usize = 32;
+/// Triangles or lines that are worth a run of their own.
 const LEAST_IN_RUN: usize = 512;
 
 /// What a pass over the model draws.
@@ -45,15 +45,24 @@ pub(crate) struct Bins {
 /// The triangles of one run.
 #[derive(Default)]
 struct Run {
-    solid: Bin,
-    layers: Bin,
+    solid: Bin<Record>,
+    layers: Bin<Record>,
+}
+
+/// Returns the number of runs for so many triangles or lines.
+pub(crate) fn runs_for(count: usize) -> usize {
+    count.div_ceil(LEAST_IN_RUN).clamp(1, RUNS)
+}
+
+/// Returns which of all are in a run.
+pub(crate) fn run_of(count: usize, run: usize, runs: usize) -> Range<usize> {
+    count * run / runs..count * (run + 1) / runs
 }
 
 /// Records, and the same once more for each tile that they touch, tile by tile.
-#[derive(Default)]
-struct Bin {
-    records: Vec<Record>,
-    by_tile: Vec<Record>,
+pub(crate) struct Bin<T> {
+    pub(crate) records: Vec<T>,
+    by_tile: Vec<T>,
     /// Where the records of a tile end in `by_tile`; they begin where those of the tile before end.
     ends: Vec<u32>,
 }
@@ -68,14 +77,13 @@ impl Bins {
         threads: &dyn Threads,
     ) {
         let triangles = pass.model.triangles as usize;
-        self.used = triangles.div_ceil(LEAST_IN_RUN).clamp(1, MOST_RUNS);
+        self.used = runs_for(triangles);
         if self.runs.len() < self.used {
             self.runs.resize_with(self.used, Run::default);
         }
         let used = self.used;
         for_each_mut(threads, &mut self.runs[..used], 1, &|i, run| {
-            let of_run = triangles * i / used..triangles * (i + 1) / used;
-            run.fill(pass, vertices, of_run);
+            run.fill(pass, vertices, run_of(triangles, i, used));
             run.solid.sort(grid);
             run.layers.sort(grid);
         });
@@ -98,10 +106,7 @@ impl Bins {
 
     /// Returns the bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        let of = |bin: &Bin| {
-            (bin.records.capacity() + bin.by_tile.capacity()) * size_of::<Record>() + bin.ends.capacity() * 4
-        };
-        self.runs.iter().map(|r| (of(&r.solid) + of(&r.layers)) as u64).sum()
+        self.runs.iter().map(|r| r.solid.bytes() + r.layers.bytes()).sum()
     }
 }
 
@@ -175,9 +180,15 @@ fn clip_into(
     clip(lens, corners, |points, plane| records.extend(Record::new(&points, plane, id, sides)));
 }
 
-impl Bin {
+impl<T> Default for Bin<T> {
+    fn default() -> Self {
+        Self { records: Vec::new(), by_tile: Vec::new(), ends: Vec::new() }
+    }
+}
+
+impl<T: Placed + Copy> Bin<T> {
     /// Sorts the records by tile, in their order within a tile: counts, sums, places.
-    fn sort(&mut self, grid: &TileGrid) {
+    pub(crate) fn sort(&mut self, grid: &TileGrid) {
         self.ends.clear();
         self.ends.resize(grid.count(), 0);
         let mut total = 0;
@@ -205,8 +216,13 @@ impl Bin {
         }
     }
 
-    fn of_tile(&self, tile: usize) -> &[Record] {
+    pub(crate) fn of_tile(&self, tile: usize) -> &[T] {
         let begin = if tile == 0 { 0 } else { self.ends[tile - 1] as usize };
         &self.by_tile[begin..self.ends[tile] as usize]
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        let records = (self.records.capacity() + self.by_tile.capacity()) * size_of::<T>();
+        (records + self.ends.capacity() * 4) as u64
     }
 }

@@ -1,6 +1,6 @@
 //! How is each object drawn, and what is lost?
 
-use crate::info::Options;
+use crate::info::{Mode, Options, Shading};
 use crate::light::Lamp;
 use crate::shadow::MapSizes;
 use polyptych_core::camera::Projection;
@@ -20,7 +20,7 @@ pub(crate) fn detail(object: &Object, need: &Need) -> Detail {
 }
 
 /// Says why an object is not drawn, if that is so.
-pub(crate) fn why_skipped(object: &Object) -> Option<String> {
+pub(crate) fn why_skipped(object: &Object, draws_lines: bool) -> Option<String> {
     if !object.visible {
         return Some("it is invisible".to_owned());
     }
@@ -28,16 +28,18 @@ pub(crate) fn why_skipped(object: &Object) -> Option<String> {
         return Some(why.to_owned());
     }
     match &*object.shape {
-        Shape::Mesh(mesh) if mesh.triangles.is_empty() => Some("line segments have no area".to_owned()),
+        Shape::Mesh(mesh) if mesh.triangles.is_empty() && !draws_lines => {
+            Some("line segments have no area: they are drawn in modes hidden-line and wireframe".to_owned())
+        }
         _ => None,
     }
 }
 
 /// Says what is lost of an object itself.
-pub(crate) fn losses(scene: &Scene, object: &Object) -> Vec<String> {
+pub(crate) fn losses(scene: &Scene, object: &Object, draws_lines: bool) -> Vec<String> {
     let mut losses = Vec::new();
     if let Shape::Mesh(mesh) = &*object.shape {
-        losses.extend(mesh_losses(mesh));
+        losses.extend(mesh_losses(mesh, draws_lines));
     }
     let materials = || (0..object.materials.len().max(1)).map(|slot| scene.material(object, slot));
     if matches!(*object.shape, Shape::Voxels(_)) && materials().any(Material::is_see_through) {
@@ -49,9 +51,9 @@ pub(crate) fn losses(scene: &Scene, object: &Object) -> Vec<String> {
     losses
 }
 
-fn mesh_losses(mesh: &Mesh) -> Vec<String> {
+fn mesh_losses(mesh: &Mesh, draws_lines: bool) -> Vec<String> {
     let mut losses = Vec::new();
-    if !mesh.segments.is_empty() {
+    if !mesh.segments.is_empty() && !draws_lines {
         losses.push(format!("{} line segments are left out: they have no area", mesh.segments.len()));
     }
     let broken =
@@ -62,10 +64,29 @@ fn mesh_losses(mesh: &Mesh) -> Vec<String> {
     losses
 }
 
-/// Says what every object loses of its light.
-pub(crate) fn light_losses(lamps: &[Lamp], options: Options, sizes: MapSizes) -> Option<&'static str> {
+/// Says what every object loses by the way it is drawn.
+pub(crate) fn losses_of_all(
+    scene: &Scene,
+    lamps: &[Lamp],
+    options: Options,
+    sizes: MapSizes,
+) -> Vec<&'static str> {
+    if options.mode.draws_lines() {
+        return vec!["drawn as lines"];
+    }
+    let shading = match options.shading {
+        Shading::Phong => None,
+        Shading::Gouraud => Some("light is interpolated between corners"),
+        Shading::Flat => Some("every triangle has one normal"),
+    };
+    let other = options.lighting.is_some_and(|model| model != scene.environment.lighting);
+    let lighting = other.then_some("highlights are not reckoned as the scene says");
+    light_losses(lamps, options, sizes).into_iter().chain(shading).chain(lighting).collect()
+}
+
+fn light_losses(lamps: &[Lamp], options: Options, sizes: MapSizes) -> Option<&'static str> {
     let casting = |lamp: &&Lamp| lamp.light.casts_shadow;
-    if !options.shadow {
+    if options.mode != Mode::Shadowed {
         return lamps.iter().find(casting).map(|_| "shadows are switched off");
     }
     let local = lamps.iter().filter(casting).any(|l| !matches!(l.light.kind, LightKind::Directional { .. }));

@@ -43,7 +43,7 @@ pub(crate) struct Face {
 pub(crate) struct Met {
     /// Along the ray, in lengths of its direction.
     pub(crate) t: f64,
-    weights: [f64; 3],
+    pub(crate) weights: [f64; 3],
     /// Whether the ray comes from the side that is not outside.
     pub(crate) from_within: bool,
     /// The nearest point of the triangle, where the ray passes beside it.
@@ -107,6 +107,20 @@ impl Face {
         let met = Met { t, weights, from_within, held: None };
         let lowest = weights[0].min(v).min(w);
         if lowest >= 0.0 { met } else { self.hold(&met, lowest, lens, x, y) }
+    }
+
+    /// Returns a corner relative to the lens's origin, and its shading normal, not of unit length.
+    pub(crate) fn raw_corner(&self, corner: usize) -> (DVec3, Vec3) {
+        match corner {
+            0 => (self.origin, self.normals[0]),
+            i => (self.origin + self.edges[i - 1], self.normals[0] + self.normals[i]),
+        }
+    }
+
+    /// Returns how far ahead the triangle's plane is at a place of the picture.
+    pub(crate) fn ahead(&self, lens: &Lens, x: f64, y: f64) -> f64 {
+        let (start, slope) = self.across.at(lens.rays, x, y);
+        (self.height - start) / slope
     }
 
     /// Keeps to the triangle where snapped corners made a pixel show it that its ray passes beside.

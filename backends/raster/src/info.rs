@@ -1,15 +1,64 @@
 //! What does the back end say of itself, and what can be set?
 
 use polyptych_core::framebuffer::Channels;
-use polyptych_core::scene::ShapeKind;
+use polyptych_core::scene::{LightingModel, ShapeKind};
 use polyptych_core::seam::{BackendInfo, Need, Parameter, ParameterKind, Value};
 
 /// The parameters of a need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Options {
     pub(crate) map_size: u32,
-    pub(crate) shadow: bool,
+    pub(crate) mode: Mode,
+    pub(crate) shading: Shading,
+    /// Nothing for that of the scene.
+    pub(crate) lighting: Option<LightingModel>,
     pub(crate) culls_back: bool,
+}
+
+/// What a picture shows of surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mode {
+    /// Light, and what blocks it.
+    Shadowed,
+    /// Light that nothing blocks.
+    Lit,
+    /// Edges that no surface hides.
+    HiddenLine,
+    /// All edges.
+    Wireframe,
+}
+
+/// Where on a triangle light is reckoned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shading {
+    /// At each pixel, with the normal interpolated between the corners.
+    Phong,
+    /// At the corners, interpolated between them.
+    Gouraud,
+    /// At each pixel, with the triangle's own normal.
+    Flat,
+}
+
+const MODES: [(&str, Mode); 4] = [
+    ("shadowed", Mode::Shadowed),
+    ("lit", Mode::Lit),
+    ("hidden-line", Mode::HiddenLine),
+    ("wireframe", Mode::Wireframe),
+];
+const SHADINGS: [(&str, Shading); 3] =
+    [("phong", Shading::Phong), ("gouraud", Shading::Gouraud), ("flat", Shading::Flat)];
+const LIGHTINGS: [(&str, Option<LightingModel>); 4] = [
+    ("scene", None),
+    ("lambert", Some(LightingModel::Lambert)),
+    ("phong", Some(LightingModel::Phong)),
+    ("blinn-phong", Some(LightingModel::BlinnPhong)),
+];
+
+impl Mode {
+    /// Tells whether edges are drawn instead of light.
+    pub(crate) fn draws_lines(self) -> bool {
+        matches!(self, Self::HiddenLine | Self::Wireframe)
+    }
 }
 
 impl Options {
@@ -17,9 +66,29 @@ impl Options {
         let (settings, declared) = (&need.settings, &info.parameters);
         Self {
             map_size: settings.int(declared, "shadow.map_size").clamp(256, 8192) as u32,
-            shadow: settings.bool(declared, "shadow"),
+            mode: named(&MODES, settings.text(declared, "mode")),
+            shading: named(&SHADINGS, settings.text(declared, "shading")),
+            lighting: named(&LIGHTINGS, settings.text(declared, "lighting")),
             culls_back: settings.text(declared, "cull") == "back",
         }
+    }
+}
+
+/// Returns what a word stands for; the first of all for words that are not declared.
+fn named<T: Copy>(all: &[(&str, T)], word: &str) -> T {
+    all.iter().find(|(name, _)| *name == word).unwrap_or(&all[0]).1
+}
+
+/// Declares a choice, the first word its default.
+fn choice(name: &'static str, choices: &'static [&'static str], help: &'static str) -> Parameter {
+    Parameter {
+        name,
+        kind: ParameterKind::Choice { choices },
+        default: Value::Text(choices[0].to_owned()),
+        unit: "",
+        help,
+        tag: "",
+        quality_axis: false,
     }
 }
 
@@ -41,24 +110,26 @@ pub(crate) fn info() -> BackendInfo {
                 tag: "shadow.quality",
                 quality_axis: true,
             },
-            Parameter {
-                name: "shadow",
-                kind: ParameterKind::Bool,
-                default: Value::Bool(true),
-                unit: "",
-                help: "Whether things block light",
-                tag: "",
-                quality_axis: false,
-            },
-            Parameter {
-                name: "cull",
-                kind: ParameterKind::Choice { choices: &["none", "back"] },
-                default: Value::Text("none".to_owned()),
-                unit: "",
-                help: "Which sides of triangles are left out; none is right for open meshes",
-                tag: "",
-                quality_axis: false,
-            },
+            choice(
+                "mode",
+                &["shadowed", "lit", "hidden-line", "wireframe"],
+                "Light with shadows or without them, edges that nothing hides, or all edges",
+            ),
+            choice(
+                "shading",
+                &["phong", "gouraud", "flat"],
+                "Light at each pixel, at the corners and interpolated, or one normal for a triangle",
+            ),
+            choice(
+                "lighting",
+                &["scene", "lambert", "phong", "blinn-phong"],
+                "How highlights are reckoned: as the scene says, none, by the reflected ray, by the half-way vector",
+            ),
+            choice(
+                "cull",
+                &["none", "back"],
+                "Which sides of triangles are left out; none is right for open meshes",
+            ),
         ],
     }
 }

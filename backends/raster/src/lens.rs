@@ -267,6 +267,32 @@ impl Lens {
     }
 }
 
+impl Lens {
+    /// Returns the distance ahead of a depth.
+    pub(crate) fn ahead(&self, depth: f64) -> f64 {
+        match self.rays {
+            Rays::Central => 1.0 / depth,
+            Rays::Parallel => -depth,
+        }
+    }
+
+    /// Returns the unit vector from a point to the eye.
+    pub(crate) fn to_eye(&self, point: DVec3) -> DVec3 {
+        match self.rays {
+            Rays::Central => -point.normalize_or_zero(),
+            Rays::Parallel => -self.direction.base.normalize_or_zero(),
+        }
+    }
+
+    /// Tells whether a plane turns its front to the eye; the point is one of its points.
+    pub(crate) fn sees_front(&self, normal: DVec3, point: DVec3) -> bool {
+        match self.rays {
+            Rays::Central => normal.dot(point) < 0.0,
+            Rays::Parallel => normal.dot(self.direction.base) < 0.0,
+        }
+    }
+}
+
 impl OnRays {
     /// Returns the function's value at the start of a ray and its change over the ray's direction.
     #[inline(always)]

@@ -16,6 +16,11 @@
 //!  batch      32 visible pixels at once: distances, places, unit normals
 //!  light      the lighting equation of the core over a batch, with shadows
 //!  paint      the steps of a tile, and the pixel's channels
+//!  lines      edges of faces, and free segments                   (prepare, for modes that draw them)
+//!  strokes    lines on the picture: which of their pixels nothing hides
+//!  crossings  where bodies cross, from the triangles of neighboring pixels
+//!  drawing    lines onto the picture
+//!  gouraud    light at corners, for that shading
 //!  faces      cameras that bend straight lines: faces of a cube, looked up
 //! ```
 //!
@@ -30,19 +35,25 @@ mod batch;
 mod bin;
 mod casters;
 mod clip;
+mod conversion;
+mod crossings;
 mod decide;
+mod drawing;
 mod face;
 mod faces;
+mod gouraud;
 mod info;
 mod layers;
 mod lens;
 mod light;
+mod lines;
 mod model;
 mod paint;
 mod plan;
 mod renderer;
 mod setup;
 mod shadow;
+mod strokes;
 #[cfg(test)]
 mod tests;
 mod tile;

@@ -2,12 +2,13 @@
 
 use crate::batch::{BATCH, Batch, OCTETS, at};
 use crate::face::Face;
+use crate::gouraud::Gouraud;
 use crate::model::Model;
 use crate::shadow::{Looks, Shadows, Sight};
 use glam::{DAffine3, DVec3, Vec3};
 use polyptych_core::lanes::{DVec3x8, F32x8, LANES, Vec3x8};
 use polyptych_core::math::Aabb;
-use polyptych_core::scene::{Arriving, Light, LightKind, Scene, Shape};
+use polyptych_core::scene::{Arriving, Light, LightKind, LightingModel, Scene, Shape};
 use polyptych_core::shade::{lit_by_material, turned_away};
 
 /// A light, made ready.
@@ -73,17 +74,30 @@ pub(crate) struct Illumination<'a> {
     pub(crate) model: &'a Model,
     pub(crate) lamps: &'a [Lamp],
     pub(crate) shadows: Option<&'a Shadows>,
+    pub(crate) lighting: LightingModel,
 }
 
 impl Illumination<'_> {
-    /// Lights all samples of a batch; `faces` are those that it names.
+    /// Lights all samples of a batch; `faces` are those that it names, and `corners` the light at their corners if
+    /// that is to be interpolated.
     #[inline(always)]
-    pub(crate) fn light(&self, batch: &mut Batch<'_>, faces: &[Face], origin: DVec3, wants: Wants) {
+    pub(crate) fn light(
+        &self,
+        batch: &mut Batch<'_>,
+        faces: &[Face],
+        corners: Option<&Gouraud>,
+        origin: DVec3,
+        wants: Wants,
+    ) {
         self.fill_ambient(batch, wants);
         let (mut casting, mut reaching) = ([0u32; BATCH], [0u32; BATCH]);
         for (index, lamp) in self.lamps.iter().enumerate() {
             let arrivals = Arrivals::of(lamp, batch, origin);
-            let added = if wants.color { self.added(batch, &arrivals) } else { [BLACK; OCTETS] };
+            let added = match corners {
+                _ if !wants.color => [BLACK; OCTETS],
+                None => self.added(batch, &arrivals),
+                Some(corners) => self.interpolated(batch, corners, index),
+            };
             let casts = lamp.light.casts_shadow;
             let (mut arrives, mut crosses) = ([false; BATCH], [false; BATCH]);
             for i in (0..batch.count).filter(|&i| arrivals.distance[i] > 0.0) {
@@ -136,10 +150,21 @@ impl Illumination<'_> {
             *added = lit_by_material(
                 materials,
                 (batch.color[o], batch.normal[o], batch.to_eye[o]),
-                self.scene.environment.lighting,
+                self.lighting,
                 arrivals.direction[o],
                 arrivals.radiance[o],
             );
+        }
+        added
+    }
+
+    /// Returns what an unshadowed light adds to all samples, interpolated between corners.
+    fn interpolated(&self, batch: &Batch<'_>, corners: &Gouraud, lamp: usize) -> [Vec3x8; OCTETS] {
+        let mut added = [BLACK; OCTETS];
+        for i in 0..batch.count {
+            let of = (usize::from(batch.face[i]), lamp);
+            let light = corners.added(of, self.lamps.len(), at!(batch.color, i), batch.weights[i]);
+            added[i / LANES].set(i % LANES, light);
         }
         added
     }

@@ -97,6 +97,14 @@ impl Source {
         }
     }
 
+    /// Returns the bound and the description of a conversion.
+    pub(crate) fn converted(&self) -> Option<(f64, String)> {
+        match self {
+            Self::Given(_) => None,
+            Self::Converted(model) => Some((model.bound, model.why.clone())),
+        }
+    }
+
     /// Tells whether both are the same triangles in memory.
     pub(crate) fn is(&self, other: &Self) -> bool {
         match (self, other) {
@@ -119,7 +127,8 @@ impl Model {
         let vertices = mesh.positions.len();
         let own_bounds = mesh.bounds();
         // Of the corners, not of the box: that of a turned box would be larger.
-        let corners = mesh.triangles.iter().flatten().map(|&i| mesh.positions[i as usize].as_dvec3());
+        let used = mesh.triangles.iter().flatten().chain(mesh.segments.iter().flatten());
+        let corners = used.map(|&i| mesh.positions[i as usize].as_dvec3());
         let bounds = Aabb::of_points(corners.map(|p| object.world_from_object.transform_point3(p)));
         let matrix = object.world_from_object.matrix3;
         let scale = matrix.x_axis.length().max(matrix.y_axis.length()).max(matrix.z_axis.length());
@@ -145,6 +154,13 @@ impl Model {
         self.triangles = triangles;
         self.vertices += vertices;
         true
+    }
+
+    /// Tells whether the parts are made from these.
+    pub(crate) fn has_sources<'a>(&self, sources: impl Iterator<Item = &'a Source>) -> bool {
+        let mut parts = self.parts.iter();
+        sources.into_iter().all(|source| parts.next().is_some_and(|part| part.source.is(source)))
+            && parts.next().is_none()
     }
 
     /// Returns the part of a triangle, and the triangle's index in it.

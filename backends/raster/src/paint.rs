@@ -2,7 +2,10 @@
 
 use crate::batch::{Ask, BATCH, Batch, at};
 use crate::bin::Bins;
-use crate::face::{Face, Faces};
+use crate::drawing::Drawing;
+use crate::face::Faces;
+use crate::gouraud::Gouraud;
+use crate::info::Shading;
 use crate::layers::{Fragment, collect, sort};
 use crate::lens::Lens;
 use crate::light::{Illumination, Wants};
@@ -24,21 +27,31 @@ pub(crate) struct Painter<'a> {
     pub(crate) light: Illumination<'a>,
     pub(crate) lens: &'a Lens,
     pub(crate) bins: &'a Bins,
+    /// The lines to draw instead of light.
+    pub(crate) drawing: Option<Drawing<'a>>,
+    shading: Shading,
     wants: Wants,
     ask: Ask,
+    pub(crate) channels: Channels,
 }
 
 /// Scratch memory of a band.
 #[derive(Default)]
 pub(crate) struct Scratch {
     fragments: Vec<Fragment>,
-    faces: Faces,
+    pub(crate) faces: Faces,
+    corners: Gouraud,
+    /// The triangles that the band shows, row by row: of drawings whose surfaces hide.
+    pub(crate) seen: Vec<u32>,
 }
 
 impl Scratch {
     /// Returns the bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.fragments.capacity() * size_of::<Fragment>() + self.faces.bytes()
+        self.fragments.capacity() * size_of::<Fragment>()
+            + self.faces.bytes()
+            + self.corners.bytes()
+            + self.seen.capacity() * 4
     }
 }
 
@@ -50,11 +63,22 @@ pub(crate) enum Announce {
 }
 
 impl<'a> Painter<'a> {
-    pub(crate) fn new(light: Illumination<'a>, lens: &'a Lens, bins: &'a Bins, channels: Channels) -> Self {
-        let wants = Wants { color: channels.has(Channel::Color), shadow: channels.has(Channel::Shadow) };
+    pub(crate) fn new(
+        light: Illumination<'a>,
+        shading: Shading,
+        lens: &'a Lens,
+        bins: &'a Bins,
+        drawing: Option<Drawing<'a>>,
+        channels: Channels,
+    ) -> Self {
+        let lit = drawing.is_none();
+        let wants = Wants {
+            color: lit && channels.has(Channel::Color),
+            shadow: lit && channels.has(Channel::Shadow),
+        };
         // Opacity decides what is seen first, so it is asked for wherever there are layers.
         let ask = if wants.color || channels.has(Channel::Albedo) { Ask::Color } else { Ask::Geometry };
-        Self { light, lens, bins, wants, ask }
+        Self { light, lens, bins, drawing, shading, wants, ask, channels }
     }
 
     /// Draws all bands, each with scratch memory of its own. Returns how many pixels were shaded.
@@ -73,6 +97,10 @@ impl<'a> Painter<'a> {
         target.for_each_band(control.threads, TILE_HEIGHT, &|mut band| {
             let row = band.first_row / TILE_HEIGHT;
             let mut scratch = scratch[row as usize].lock().unwrap_or_else(PoisonError::into_inner);
+            if self.hides_lines() {
+                scratch.seen.clear();
+                scratch.seen.resize((band.width * band.rows) as usize, NO_TRIANGLE);
+            }
             for column in 0..grid.columns {
                 if control.is_cancelled() {
                     stopped.store(true, Ordering::Relaxed);
@@ -125,10 +153,12 @@ impl<'a> Painter<'a> {
         let area = grid.area(tile);
         // 1. Visibility: the nearest solid triangle of each pixel.
         let mut buffer = TileBuffer::new();
-        buffer.draw_here(self.bins.solid(tile), &area);
-        // 2. What light may pass through, in front of it.
+        if self.drawing.is_none_or(|drawing| drawing.hides) {
+            buffer.draw_here(self.bins.solid(tile), &area);
+        }
+        // 2. What light may pass through, in front of it. It hides no line.
         scratch.fragments.clear();
-        for record in self.bins.layers(tile) {
+        for record in self.bins.layers(tile).take_while(|_| self.drawing.is_none()) {
             collect(&mut scratch.fragments, record, &area, &buffer);
         }
         sort(&mut scratch.fragments);
@@ -138,13 +168,31 @@ impl<'a> Painter<'a> {
                 self.background_row(&area, row, band);
             }
         }
-        if self.bins.solid(tile).next().is_none() && scratch.fragments.is_empty() {
+        let shaded = self.resolve(&area, &buffer, band, scratch);
+        if let Some(drawing) = self.drawing {
+            self.draw_lines(&drawing, tile, &area, &buffer.id, band, scratch);
+        }
+        shaded
+    }
+
+    /// Puts the visible surfaces of a tile into the picture and returns the number of pixels that they take.
+    #[inline(always)]
+    fn resolve(
+        &self,
+        area: &TileArea,
+        buffer: &TileBuffer,
+        band: &mut Band<'_>,
+        scratch: &mut Scratch,
+    ) -> u64 {
+        let Scratch { fragments, faces, corners, .. } = scratch;
+        faces.clear();
+        corners.clear();
+        if fragments.is_empty() && buffer.id.iter().all(|&id| id == NO_TRIANGLE) {
             return 0;
         }
         // 3. Resolve: surfaces and their light, for what is visible only.
-        let Scratch { fragments, faces } = scratch;
-        faces.clear();
-        let mut tile = TilePainter { painter: self, area, band, faces, layers: Layers::default(), shaded: 0 };
+        let layers = Layers::default();
+        let mut tile = TilePainter { painter: self, area: *area, band, faces, corners, layers, shaded: 0 };
         let mut samples = Samples { solid: &buffer.id, layers: fragments, pixel: 0, behind_layers: false };
         let (mut batch, mut more) = (Batch::new(), true);
         while more {
@@ -188,14 +236,27 @@ impl<'a> Painter<'a> {
 
     /// Finds and lights the surfaces of a batch.
     #[inline(always)]
-    fn light(&self, batch: &mut Batch<'a>, faces: &[Face]) {
+    fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
         let light = &self.light;
         // Opacity decides what is seen first.
         let layered = batch.tag[..batch.count].iter().any(|tag| tag & LAYER != 0);
         let ask = if layered { Ask::Color } else { self.ask };
-        batch.resolve(light.scene, light.model, self.lens, faces, ask);
+        batch.resolve(light.scene, light.model, self.lens, &faces.faces, (ask, self.shading));
+        if self.drawing.is_some() {
+            // Surfaces have the color of the paper.
+            let background = &light.scene.environment.background;
+            for i in 0..batch.count {
+                let direction = -at!(batch.to_eye, i).as_dvec3();
+                batch.lit[i / LANES].set(i % LANES, background.color(direction));
+            }
+            return;
+        }
         if self.wants.color || self.wants.shadow {
-            light.light(batch, faces, self.lens.origin, self.wants);
+            let interpolated = self.wants.color && self.shading == Shading::Gouraud;
+            if interpolated {
+                corners.light(light, self.lens, faces);
+            }
+            light.light(batch, &faces.faces, interpolated.then_some(&*corners), self.lens.origin, self.wants);
         }
         if light.scene.environment.fog.is_some() {
             for i in 0..batch.count {
@@ -250,6 +311,7 @@ struct TilePainter<'t, 'a, 'b> {
     area: TileArea,
     band: &'t mut Band<'b>,
     faces: &'t mut Faces,
+    corners: &'t mut Gouraud,
     layers: Layers,
     shaded: u64,
 }
@@ -286,7 +348,7 @@ impl<'a> TilePainter<'_, 'a, '_> {
     /// Draws all samples of the batch into the picture.
     #[inline(always)]
     fn finish(&mut self, batch: &mut Batch<'a>) {
-        self.painter.light(batch, &self.faces.faces);
+        self.painter.light(batch, self.faces, self.corners);
         let mut index = [0; BATCH];
         for (index, tag) in index.iter_mut().zip(&batch.tag[..batch.count]) {
             let (x, y) = self.place(*tag);
@@ -302,6 +364,7 @@ impl<'a> TilePainter<'_, 'a, '_> {
         batch.count = 0;
         if self.faces.is_full() {
             self.faces.clear();
+            self.corners.clear();
         }
     }
 

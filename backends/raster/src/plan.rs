@@ -1,9 +1,9 @@
 //! What would be built for a need, and what would that cost?
 
 use crate::decide::{
-    RESAMPLED, decision, detail, is_resampled, light_losses, losses, why_skipped, with_loss,
+    RESAMPLED, decision, detail, is_resampled, losses, losses_of_all, why_skipped, with_loss,
 };
-use crate::info::Options;
+use crate::info::{Mode, Options};
 use crate::light::Lamp;
 use crate::shadow::MapSizes;
 use polyptych_core::convert::Converter;
@@ -20,7 +20,7 @@ const TRIANGLE_BYTES: f64 = 30.0;
 pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
     let lamps = Lamp::all(scene);
     let sizes = MapSizes::new(options.map_size, &lamps);
-    let of_light = light_losses(&lamps, options, sizes);
+    let of_all = losses_of_all(scene, &lamps, options, sizes);
     let bends = is_resampled(&need.camera.projection);
     let forecasts = Converter::default();
     let mut triangles = 0.0;
@@ -28,8 +28,9 @@ pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
         .objects
         .iter()
         .map(|object| {
-            let mut plan = plan_object(&forecasts, scene, object, need, &mut triangles);
-            for loss in of_light.into_iter().chain(bends.then_some(RESAMPLED)) {
+            let mut plan =
+                plan_object(&forecasts, scene, object, need, options.mode.draws_lines(), &mut triangles);
+            for loss in of_all.iter().copied().chain(bends.then_some(RESAMPLED)) {
                 plan.decision = with_loss(&plan.decision, loss);
             }
             plan
@@ -61,6 +62,7 @@ fn plan_object(
     scene: &Scene,
     object: &Object,
     need: &Need,
+    draws_lines: bool,
     triangles: &mut f64,
 ) -> ObjectPlan {
     let mut plan = ObjectPlan {
@@ -70,7 +72,7 @@ fn plan_object(
         builds: String::new(),
         bytes: 0,
     };
-    if let Some(why) = why_skipped(object) {
+    if let Some(why) = why_skipped(object, draws_lines) {
         plan.decision = Decision::Skipped { why };
         return plan;
     }
@@ -84,7 +86,7 @@ fn plan_object(
         plan.bytes = forecast.bytes;
         converted = Some((forecast.bound, forecast.builds));
     }
-    plan.decision = decision(object, converted, losses(scene, object));
+    plan.decision = decision(object, converted, losses(scene, object, draws_lines));
     plan
 }
 
@@ -97,14 +99,14 @@ fn see_through(scene: &Scene) -> PassPlan {
 
 /// Tells whether an object can block light: volumes and what is see-through let it pass.
 fn blocks_light(scene: &Scene, object: &Object) -> bool {
-    why_skipped(object).is_none()
+    why_skipped(object, false).is_none()
         && !matches!(&*object.shape, Shape::Volume(_))
         && (0..object.materials.len().max(1)).any(|slot| !scene.material(object, slot).is_see_through())
 }
 
 fn plan_map(index: usize, lamp: &Lamp, need: &Need, options: Options, blocks: bool) -> PassPlan {
     let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
-    let (needed, why) = match (options.shadow, asked, lamp.light.casts_shadow) {
+    let (needed, why) = match (options.mode == Mode::Shadowed, asked, lamp.light.casts_shadow) {
         (false, _, _) => (false, "shadows are switched off"),
         (_, false, _) => (false, "neither color nor shadow is asked for"),
         (_, _, false) => (false, "the light casts no shadow"),

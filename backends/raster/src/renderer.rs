@@ -1,19 +1,23 @@
 //! How does the host drive the rasterizer: plan, prepare, render?
 
 use crate::bin::{Bins, Pass};
+use crate::conversion::Conversion;
 use crate::decide::{self, RESAMPLED, is_resampled};
+use crate::drawing::Drawing;
 use crate::faces::{Faces, face_lens, needed};
-use crate::info::{Options, info};
+use crate::info::{Mode, Options, info};
 use crate::lens::Lens;
 use crate::light::{Illumination, Lamp};
+use crate::lines::Lines;
 use crate::model::{Model, Role, Source};
 use crate::paint::{self, Announce, Painter};
 use crate::plan::plan;
 use crate::shadow::{MapSizes, Shadows};
+use crate::strokes::Strokes;
 use crate::tile::TileGrid;
 use crate::transform::{ScreenVertex, transform};
 use polyptych_core::camera::Camera;
-use polyptych_core::convert::{Converter, Detail, MeshModel};
+use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Framebuffer};
 use polyptych_core::scene::{Light, Object, Scene, Shape};
 use polyptych_core::seam::{
@@ -53,9 +57,15 @@ pub struct Raster {
 /// A prepared scene.
 struct Ready {
     scene: Arc<Scene>,
-    model: Model,
+    model: Arc<Model>,
+    /// What each object loses by being triangles.
+    given: Arc<[Decision]>,
+    /// Made when they are drawn.
+    lines: Option<Arc<Lines>>,
     lamps: Vec<Lamp>,
     shadows: Option<Arc<Shadows>>,
+    /// Those of a mode without shadows, which may be switched back.
+    resting_shadows: Option<Arc<Shadows>>,
     sizes: MapSizes,
     options: Options,
     decisions: Arc<[Decision]>,
@@ -69,19 +79,9 @@ struct Ready {
 struct Scratch {
     vertices: Vec<ScreenVertex>,
     bins: Bins,
+    strokes: Strokes,
     bands: Vec<Mutex<paint::Scratch>>,
     faces: Faces,
-}
-
-/// A converted shape with all that it was made from.
-struct Conversion {
-    shape: Arc<Shape>,
-    matrix: glam::DMat3,
-    /// Which slots let light through: it decides which faces of voxels are seen.
-    see_through: Vec<bool>,
-    /// The converter's class of the tolerance.
-    class: i32,
-    model: Arc<MeshModel>,
 }
 
 impl Default for Raster {
@@ -97,46 +97,70 @@ impl Raster {
         Self { info: info(), ready: None, converted: Vec::new(), scratch: Scratch::default() }
     }
 
+    /// Returns the model, to tell whether it was kept.
+    #[cfg(test)]
+    pub(crate) fn model_in_use(&self) -> Option<Arc<Model>> {
+        self.ready.as_ref().map(|ready| ready.model.clone())
+    }
+
     /// Returns the shadow maps, to tell whether they were kept.
     #[cfg(test)]
     pub(crate) fn shadows(&self) -> Option<Arc<Shadows>> {
         self.ready.as_ref()?.shadows.clone()
     }
 
-    /// Decides about all objects and converts what must be.
+    /// Converts what must be and decides about all objects; keeps the model of before where it is the same.
     fn build_model(
         &mut self,
-        scene: &Scene,
+        before: Option<&Ready>,
+        scene: &Arc<Scene>,
         need: &Need,
         converter: &Converter,
         control: &Control<'_>,
-    ) -> Result<(Model, Vec<Decision>), RenderError> {
-        let (mut model, mut decisions) = (Model::default(), Vec::with_capacity(scene.objects.len()));
-        let mut used = Vec::new();
-        for (index, object) in scene.objects.iter().enumerate() {
+    ) -> Result<(Arc<Model>, Arc<[Decision]>), RenderError> {
+        let draws_lines = Options::of(need, &self.info).mode.draws_lines();
+        let (mut sources, mut used) = (Vec::with_capacity(scene.objects.len()), Vec::new());
+        for object in &scene.objects {
             control.check()?;
-            if let Some(why) = decide::why_skipped(object) {
+            if let Some(reason) = decide::why_skipped(object, draws_lines) {
                 if object.required && object.visible {
-                    return Err(RenderError::Required { object: object.name.clone(), reason: why });
+                    return Err(RenderError::Required { object: object.name.clone(), reason });
                 }
-                decisions.push(Decision::Skipped { why });
-                continue;
-            }
-            let (source, converted) = if let Shape::Mesh(_) = &*object.shape {
-                (Source::Given(object.shape.clone()), None)
+                sources.push(Err(reason));
+            } else if let Shape::Mesh(_) = &*object.shape {
+                sources.push(Ok(Source::Given(object.shape.clone())));
             } else {
                 let conversion = self.convert(scene, object, need, converter, control)?;
-                let mesh = conversion.model.clone();
+                sources.push(Ok(Source::Converted(conversion.model.clone())));
                 used.push(conversion);
-                (Source::Converted(mesh.clone()), Some((mesh.bound, mesh.why.clone())))
-            };
-            if !model.add(scene, index, source) {
-                return Err(RenderError::Failed(format!("more than {} triangles", u32::MAX)));
             }
-            decisions.push(decide::decision(object, converted, decide::losses(scene, object)));
         }
         self.converted = used;
-        Ok((model, decisions))
+        let is_same = |before: &&Ready| {
+            Arc::ptr_eq(&before.scene, scene)
+                && before.model.has_sources(sources.iter().filter_map(|s| s.as_ref().ok()))
+        };
+        let before = before.filter(is_same);
+        let decide = |(object, source): (&Object, &Result<Source, String>)| match source {
+            Err(why) => Decision::Skipped { why: why.clone() },
+            Ok(source) => {
+                decide::decision(object, source.converted(), decide::losses(scene, object, draws_lines))
+            }
+        };
+        let decisions = match before.filter(|b| b.options.mode.draws_lines() == draws_lines) {
+            Some(before) => before.given.clone(),
+            None => scene.objects.iter().zip(&sources).map(decide).collect(),
+        };
+        if let Some(before) = before {
+            return Ok((before.model.clone(), decisions));
+        }
+        let mut model = Model::default();
+        for (index, source) in sources.into_iter().enumerate() {
+            if source.is_ok_and(|source| !model.add(scene, index, source)) {
+                return Err(RenderError::Failed(format!("more than {} triangles", u32::MAX)));
+            }
+        }
+        Ok((Arc::new(model), decisions))
     }
 
     /// Finds what an earlier call converted, or asks the converter.
@@ -156,27 +180,8 @@ impl Raster {
                 .mesh(scene, object, detail, control.threads)
                 .map_err(|e| RenderError::Failed(e.to_string()))?,
         };
-        Ok(Conversion {
-            shape: object.shape.clone(),
-            matrix: object.world_from_object.matrix3,
-            see_through: see_through(scene, object),
-            class: detail.class(object),
-            model,
-        })
+        Ok(Conversion::new(scene, object, detail, model))
     }
-}
-
-impl Conversion {
-    fn serves(&self, scene: &Scene, object: &Object, detail: Detail) -> bool {
-        Arc::ptr_eq(&self.shape, &object.shape)
-            && self.class == detail.class(object)
-            && self.matrix == object.world_from_object.matrix3
-            && self.see_through == see_through(scene, object)
-    }
-}
-
-fn see_through(scene: &Scene, object: &Object) -> Vec<bool> {
-    (0..object.materials.len()).map(|slot| scene.material(object, slot).is_see_through()).collect()
 }
 
 impl Renderer for Raster {
@@ -197,30 +202,40 @@ impl Renderer for Raster {
     ) -> Result<Prepared, RenderError> {
         let before = self.ready.take();
         let options = Options::of(need, &self.info);
-        let (model, mut decisions) = self.build_model(scene, need, converter, control)?;
+        let (model, given) = self.build_model(before.as_ref(), scene, need, converter, control)?;
         let lamps = Lamp::all(scene);
         let sizes = MapSizes::new(options.map_size, &lamps);
-        if let Some(loss) = decide::light_losses(&lamps, options, sizes) {
+        let mut decisions = given.to_vec();
+        for loss in decide::losses_of_all(scene, &lamps, options, sizes) {
             decisions.iter_mut().for_each(|d| *d = decide::with_loss(d, loss));
         }
+        let kept = before.as_ref().filter(|b| Arc::ptr_eq(&b.model, &model)).and_then(|b| b.lines.clone());
+        let lines = options.mode.draws_lines().then(|| kept.unwrap_or_else(|| Arc::new(Lines::of(&model))));
         let casts = lamps.iter().any(|l| l.light.casts_shadow);
         let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
         let mut ready = Ready {
             scene: scene.clone(),
             model,
+            given,
+            lines,
             lamps,
             shadows: None,
+            resting_shadows: None,
             sizes,
             options,
             decisions_resampled: decisions.iter().map(|d| decide::with_loss(d, RESAMPLED)).collect(),
             decisions: decisions.into(),
             as_drawn: OnceLock::new(),
         };
-        if options.shadow && casts && asked {
-            ready.shadows = Some(match before.and_then(|b| b.shadows_for(&ready)) {
+        let kept = before.and_then(|b| b.shadows_for(&ready));
+        if options.mode == Mode::Shadowed && casts && asked {
+            ready.shadows = Some(match kept {
                 Some(kept) => kept,
                 None => Arc::new(self.scratch.draw_shadows(&ready, control)?),
             });
+        } else {
+            // They may be wanted again.
+            ready.resting_shadows = kept;
         }
         let prepared = Prepared { objects: ready.decisions(&need.camera), bytes: ready.bytes() };
         self.ready = Some(ready);
@@ -293,7 +308,7 @@ impl Scratch {
             announce,
             work,
             control,
-            (&mut self.vertices, &mut self.bins, &mut self.bands),
+            (&mut self.vertices, &mut self.bins, &mut self.strokes, &mut self.bands),
         )
     }
 
@@ -312,7 +327,7 @@ impl Scratch {
         let needed = needed(camera, width, height, control.threads);
         for face in (0..6).filter(|face| needed >> face & 1 == 1) {
             let lens = face_lens(camera, face, edge, ready.near(camera)).with_depths_of(&ready.model.bounds);
-            let buffers = (&mut self.vertices, &mut self.bins, &mut self.bands);
+            let buffers = (&mut self.vertices, &mut self.bins, &mut self.strokes, &mut self.bands);
             let picture = self.faces.picture(face);
             draw(ready, &lens, picture, Announce::No, work, control, buffers)?;
         }
@@ -331,11 +346,13 @@ impl Scratch {
         let bands: usize = self.bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
         (self.vertices.capacity() * size_of::<ScreenVertex>() + bands) as u64
             + self.bins.bytes()
+            + self.strokes.bytes()
             + self.faces.bytes()
     }
 }
 
-type Buffers<'a> = (&'a mut Vec<ScreenVertex>, &'a mut Bins, &'a mut Vec<Mutex<paint::Scratch>>);
+type Buffers<'a> =
+    (&'a mut Vec<ScreenVertex>, &'a mut Bins, &'a mut Strokes, &'a mut Vec<Mutex<paint::Scratch>>);
 
 /// The pipeline.
 fn draw(
@@ -345,7 +362,7 @@ fn draw(
     announce: Announce,
     work: &mut Work,
     control: &Control<'_>,
-    (vertices, bins, bands): Buffers<'_>,
+    (vertices, bins, strokes, bands): Buffers<'_>,
 ) -> Result<(), Cancelled> {
     control.check()?;
     let culls_back = ready.options.culls_back;
@@ -356,6 +373,10 @@ fn draw(
     // 2. Clip, set up, and sort the triangles into tiles.
     bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height), control.threads);
     work.triangles += bins.triangles();
+    let drawing = ready.lines.as_deref().map(|lines| {
+        strokes.fill(lines, &ready.model, lens, vertices, culls_back, control.threads);
+        Drawing { lines, strokes, hides: ready.options.mode == Mode::HiddenLine }
+    });
     work.phases.end("bin");
     // 3. Draw tile by tile: visibility, layers, surfaces and light.
     let light = Illumination {
@@ -363,9 +384,13 @@ fn draw(
         model: &ready.model,
         lamps: &ready.lamps,
         shadows: ready.shadows.as_deref(),
+        lighting: ready.options.lighting.unwrap_or(ready.scene.environment.lighting),
     };
-    let painter = Painter::new(light, lens, bins, target.channels());
+    let painter = Painter::new(light, ready.options.shading, lens, bins, drawing, target.channels());
     work.shaded += painter.paint(target, bands, announce, control)?;
+    if painter.paint_crossings(target, bands, control) && announce == Announce::Yes {
+        control.finished(&target.band());
+    }
     work.phases.end("draw");
     Ok(())
 }
@@ -385,7 +410,8 @@ impl Ready {
     fn bytes(&self) -> u64 {
         let converted = |s: &Source| if let Source::Converted(m) = s { m.mesh.bytes() } else { 0 };
         self.model.parts.iter().map(|p| converted(&p.source)).sum::<u64>()
-            + self.shadows.as_ref().map_or(0, |s| s.bytes())
+            + self.shadows.as_ref().or(self.resting_shadows.as_ref()).map_or(0, |s| s.bytes())
+            + self.lines.as_ref().map_or(0, |lines| lines.bytes())
     }
 
     /// Returns the shadow maps if they are those of another scene, too: same lights, same things that block.
@@ -398,7 +424,7 @@ impl Ready {
             other.scene.materials.iter().any(|m| m.alpha != polyptych_core::scene::AlphaMode::Opaque);
         let same_masks = !has_masks || Arc::ptr_eq(&self.scene, &other.scene);
         let same = self.sizes == other.sizes && same_parts && same_cells && same_masks;
-        if same && lights(&self) == lights(other) { self.shadows } else { None }
+        if same && lights(&self) == lights(other) { self.shadows.or(self.resting_shadows) } else { None }
     }
 
     /// Returns the scene with converted shapes as meshes. Polyhedra and voxels are drawn by their true faces

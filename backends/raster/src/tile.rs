@@ -52,6 +52,12 @@ pub(crate) struct Span {
     pub(crate) y: i32,
 }
 
+/// What lies in a box of pixels.
+pub(crate) trait Placed {
+    /// Returns the first and last column and row that it can cover; maybe none.
+    fn pixels(&self) -> ([i32; 2], [i32; 2]);
+}
+
 impl TileGrid {
     pub(crate) fn new(width: u32, height: u32) -> Self {
         Self { width, height, columns: width.div_ceil(TILE_WIDTH), rows: height.div_ceil(TILE_HEIGHT) }
@@ -72,8 +78,8 @@ impl TileGrid {
         }
     }
 
-    /// Calls `touch` for the tiles under the box around a triangle.
-    pub(crate) fn for_each_touched(&self, record: &Record, mut touch: impl FnMut(usize)) {
+    /// Calls `touch` for the tiles under a box.
+    pub(crate) fn for_each_touched(&self, record: &impl Placed, mut touch: impl FnMut(usize)) {
         let ([x0, x1], [y0, y1]) = record.pixels();
         let (x0, x1) = (x0.max(0), x1.min(self.width as i32 - 1));
         let (y0, y1) = (y0.max(0), y1.min(self.height as i32 - 1));
@@ -150,6 +156,12 @@ impl Pixels {
         let (x0, x1) = (x0.max(area.x), x1.min(area.x + area.width - 1));
         let (y0, y1) = (y0.max(area.y), y1.min(area.y + area.height - 1));
         (x0 <= x1 && y0 <= y1).then_some(Self { x0, x1, y0, y1 })
+    }
+}
+
+impl Placed for Record {
+    fn pixels(&self) -> ([i32; 2], [i32; 2]) {
+        self.pixels()
     }
 }
 

@@ -160,7 +160,7 @@ fn no_map_is_drawn_that_nobody_needs() {
     assert!(raster.shadows().is_none());
     let mut need = need_of(need.camera, 9, 9);
     let declared = raster.info().parameters.clone();
-    need.settings.set("raster", &declared, "shadow", "off").unwrap();
+    need.settings.set("raster", &declared, "mode", "lit").unwrap();
     let prepared = raster.prepare(&scene, &need, &Converter::default(), &control).unwrap();
     assert!(raster.shadows().is_none());
     assert_eq!(prepared.objects[1].why(), "shadows are switched off");

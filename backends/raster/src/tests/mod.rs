@@ -3,6 +3,7 @@
 mod agreement;
 mod coverage;
 mod host;
+mod lines;
 mod pictures;
 mod shadows;
 
@@ -23,8 +24,23 @@ fn camera(eye: [f64; 3], target: [f64; 3]) -> Camera {
 
 /// Draws all channels.
 fn draw(scene: &Scene, camera: Camera, width: u32, height: u32) -> Framebuffer {
-    let need = Need { channels: Channels::ALL, ..Need::new(camera, width, height) };
+    draw_with(scene, camera, width, height, &[])
+}
+
+/// Draws all channels with parameters.
+fn draw_with(
+    scene: &Scene,
+    camera: Camera,
+    width: u32,
+    height: u32,
+    settings: &[(&str, &str)],
+) -> Framebuffer {
+    let mut need = Need { channels: Channels::ALL, ..Need::new(camera, width, height) };
     let (mut raster, control) = (Raster::new(), Control::simple());
+    let declared = raster.info().parameters.clone();
+    for (name, value) in settings {
+        need.settings.set("raster", &declared, name, value).unwrap();
+    }
     raster.prepare(&Arc::new(scene.clone()), &need, &Converter::default(), &control).unwrap();
     let mut picture = Framebuffer::new(width, height, need.channels);
     raster.render(&need.frame(), &mut picture, &control).unwrap();
