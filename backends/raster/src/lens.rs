@@ -271,8 +271,8 @@ impl Lens {
     /// Returns the distance ahead of a depth.
     pub(crate) fn ahead(&self, depth: f64) -> f64 {
         match self.rays {
-            Rays::Central => 1.0 / depth,
-            Rays::Parallel => -depth,
+            Rays::Central => 1.0 / (depth + self.farthest),
+            Rays::Parallel => -(depth + self.farthest),
         }
     }
 
@@ -374,6 +374,11 @@ mod tests {
                     assert!(depth(z + 1e-4) > depth(z), "10^{power}: {z}");
                 }
                 assert!(depth(-1.0) == 0.0 && depth(1.0).is_finite());
+                let ahead = lens.ahead(lens.depth(far.z - 0.5));
+                assert!(
+                    (ahead - (far.z - 0.5)).abs() < 1e-4 * (far.z / 4e8).max(1e-4),
+                    "10^{power}: {ahead}"
+                );
             }
         }
         let empty = Lens::central(DVec3::ZERO, axes, 50.0, [100, 100], 1e-3).with_depths_of(&Aabb::EMPTY);

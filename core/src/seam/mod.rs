@@ -1,6 +1,7 @@
 //! The seam between hosts and back ends: one trait, and data on both sides of it.
 
 mod control;
+mod demand;
 mod info;
 mod need;
 mod parameter;
@@ -10,6 +11,7 @@ mod renderer;
 mod report;
 
 pub use control::{Cancelled, Control, Watcher};
+pub use demand::{Demand, Surfaces, blocks_light, detail, left_out, why_not_drawn};
 pub use info::BackendInfo;
 pub use need::{Frame, Need};
 pub use parameter::{Parameter, ParameterError, ParameterKind, Settings, Value};
