@@ -17,7 +17,6 @@ use polyptych_core::shade::{facing, fogged};
 /// How to draw.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Options {
-    pub(crate) shadows: bool,
     /// Step through volumes in units of the smallest spacing.
     pub(crate) volume_step: f64,
 }
@@ -167,7 +166,7 @@ impl FrameDrawing<'_> {
 
     fn illumination(&self) -> Illumination<'_> {
         let wanted = self.channels.has(Channel::Color) || self.channels.has(Channel::Shadow);
-        Illumination { world: self.world, shadows: self.options.shadows, wanted }
+        Illumination { world: self.world, wanted }
     }
 
     /// Gathers see-through surfaces and volumes in front of the opaque ones, layer by layer.

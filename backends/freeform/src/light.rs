@@ -29,7 +29,6 @@ pub(crate) struct Scratch {
 #[derive(Clone, Copy)]
 pub(crate) struct Illumination<'a> {
     pub(crate) world: &'a World,
-    pub(crate) shadows: bool,
     /// Whether light is asked for at all.
     pub(crate) wanted: bool,
 }
@@ -70,8 +69,9 @@ impl<'a> Illumination<'a> {
                 }
             }
         }
-        for light in self.world.lights.iter().filter(|_| self.wanted) {
-            self.add(light, rays, lit, (scratch, form), traced);
+        let lights = self.world.lights.iter().zip(&self.world.blocked);
+        for (light, &is_blocked) in lights.filter(|_| self.wanted) {
+            self.add(light, is_blocked, rays, lit, (scratch, form), traced);
         }
     }
 
@@ -80,6 +80,7 @@ impl<'a> Illumination<'a> {
     fn add(
         &self,
         light: &Light,
+        is_blocked: bool,
         rays: &[Rays],
         lit: &mut [Lit<'_>; OCTETS],
         (scratch, form): (&mut Scratch, &mut FormScratch),
@@ -100,7 +101,7 @@ impl<'a> Illumination<'a> {
         }
         scratch.blocked.clear();
         scratch.blocked.extend(scratch.rays.iter().map(Hits::nothing));
-        if light.casts_shadow && self.shadows {
+        if is_blocked {
             *traced += scratch.rays.iter().map(|r| u64::from(r.open().count())).sum::<u64>();
             self.block(scratch, form);
         }

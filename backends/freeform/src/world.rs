@@ -18,6 +18,8 @@ pub(crate) struct World {
     pub(crate) scene: Arc<Scene>,
     pub(crate) bodies: Vec<Body>,
     pub(crate) lights: Vec<Light>,
+    /// For each light whether anything can stand between it and a surface, so that shadow rays are cast.
+    pub(crate) blocked: Vec<bool>,
     pub(crate) decisions: Arc<[Decision]>,
 }
 
@@ -87,6 +89,21 @@ impl Geometry {
             Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume)),
             Shape::Mesh(_) | Shape::Voxels(_) => return None,
         })
+    }
+
+    /// Returns what [`Geometry::bytes`] will be for a shape that is drawn as given; nothing for others.
+    pub(crate) fn planned_bytes(shape: &Shape) -> u64 {
+        match shape {
+            Shape::Primitive(Primitive::Plane { .. }) => 16,
+            // A form as steps is as large as what is written of it here.
+            Shape::Primitive(primitive) => {
+                FreeForm::from_primitive(primitive).map_or(0, |form| FormBody::new(&form).bytes())
+            }
+            Shape::FreeForm(form) => FormBody::new(form).bytes(),
+            Shape::HeightField(heights) => HeightBody::planned_bytes(heights),
+            Shape::Volume(volume) => VolumeBody::planned_bytes(volume),
+            Shape::Mesh(_) | Shape::Voxels(_) => 0,
+        }
     }
 
     pub(crate) fn bytes(&self) -> u64 {

@@ -18,7 +18,7 @@ use crate::tile::TileGrid;
 use crate::transform::{ScreenVertex, transform};
 use polyptych_core::camera::Camera;
 use polyptych_core::convert::Converter;
-use polyptych_core::framebuffer::{Channel, Framebuffer};
+use polyptych_core::framebuffer::Framebuffer;
 use polyptych_core::scene::{Light, Object, Scene, Shape};
 use polyptych_core::seam::{
     BackendFactory, BackendInfo, Cancelled, Control, Counter, Decision, Frame, Need, Phases, Plan, Prepared,
@@ -203,7 +203,11 @@ impl Renderer for Raster {
         let before = self.ready.take();
         let options = Options::of(need, &self.info);
         let (model, given) = self.build_model(before.as_ref(), scene, need, converter, control)?;
-        let lamps = Lamp::all(scene);
+        let mut lamps = Lamp::all(scene);
+        let demand = decide::demand(scene, need, &lamps, options);
+        for (lamp, shadow) in lamps.iter_mut().zip(&demand.shadows) {
+            lamp.is_blocked = shadow.is_ok();
+        }
         let sizes = MapSizes::new(options.map_size, &lamps);
         let mut decisions = given.to_vec();
         for loss in decide::losses_of_all(scene, &lamps, options, sizes) {
@@ -211,8 +215,6 @@ impl Renderer for Raster {
         }
         let kept = before.as_ref().filter(|b| Arc::ptr_eq(&b.model, &model)).and_then(|b| b.lines.clone());
         let lines = options.mode.draws_lines().then(|| kept.unwrap_or_else(|| Arc::new(Lines::of(&model))));
-        let casts = lamps.iter().any(|l| l.light.casts_shadow);
-        let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
         let mut ready = Ready {
             scene: scene.clone(),
             model,
@@ -228,7 +230,7 @@ impl Renderer for Raster {
             as_drawn: OnceLock::new(),
         };
         let kept = before.and_then(|b| b.shadows_for(&ready));
-        if options.mode == Mode::Shadowed && casts && asked {
+        if demand.any_shadow() {
             ready.shadows = Some(match kept {
                 Some(kept) => kept,
                 None => Arc::new(self.scratch.draw_shadows(&ready, control)?),
@@ -408,7 +410,12 @@ impl Ready {
     }
 
     fn bytes(&self) -> u64 {
-        let converted = |s: &Source| if let Source::Converted(m) = s { m.mesh.bytes() } else { 0 };
+        // Objects of one shape share its triangles.
+        let mut seen = std::collections::HashSet::new();
+        let mut converted = |s: &Source| match s {
+            Source::Converted(m) if seen.insert(Arc::as_ptr(m)) => m.mesh.bytes(),
+            _ => 0,
+        };
         self.model.parts.iter().map(|p| converted(&p.source)).sum::<u64>()
             + self.shadows.as_ref().or(self.resting_shadows.as_ref()).map_or(0, |s| s.bytes())
             + self.lines.as_ref().map_or(0, |lines| lines.bytes())

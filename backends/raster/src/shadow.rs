@@ -183,7 +183,7 @@ impl Shadows {
         for lamp in lamps {
             let mut map = Map::default();
             let (bounds, left_out) = casters.of_light(model, &lamp.light.kind, lamp.cell);
-            if lamp.light.casts_shadow && !bounds.is_empty() {
+            if lamp.is_blocked && !bounds.is_empty() {
                 let bounds = Aabb::new(bounds.min - origin, bounds.max - origin);
                 for mut lens in lenses(&lamp.light.kind, sizes, &bounds, origin) {
                     control.check()?;
@@ -201,6 +201,18 @@ impl Shadows {
             shadows.maps.push(map);
         }
         Ok(shadows)
+    }
+
+    /// Returns the bytes of the map of a light, and those of a triangle that may block.
+    pub(crate) fn planned_bytes(kind: &LightKind, sizes: MapSizes) -> (u64, u64) {
+        let square = |edge: u32| (TileGrid::new(edge, edge).count() * TILE_PIXELS * 4) as u64;
+        let map = match kind {
+            LightKind::Directional { .. } => square(sizes.directional),
+            LightKind::Point { .. } | LightKind::Spot { .. } => {
+                sizes.local.map_or(0, |edge| faces_of(kind) * square(edge))
+            }
+        };
+        (map, size_of::<Blocker>() as u64)
     }
 
     /// Returns the bytes held.

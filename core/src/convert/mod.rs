@@ -13,6 +13,7 @@ mod primitive_mesh;
 mod voxel_mesh;
 mod voxelize;
 
+use crate::math::Aabb;
 use crate::parallel::Threads;
 use crate::scene::{Material, Mesh, Object, Scene, Shape, Voxels};
 use glam::{DAffine3, DVec3};
@@ -36,6 +37,39 @@ pub struct Forecast {
     pub bound: f64,
     /// What would be built, for people: `"about 12,000 triangles"`.
     pub builds: String,
+    /// Triangles; 0 for what is none.
+    pub triangles: u64,
+    /// Corners of them that are kept apart.
+    pub vertices: u64,
+}
+
+impl Forecast {
+    fn of_grid(bytes: u64, bound: f64, builds: String) -> Self {
+        Self { bytes, bound, builds, triangles: 0, vertices: 0 }
+    }
+}
+
+/// How large a mesh is or would be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct MeshSize {
+    vertices: f64,
+    triangles: f64,
+    /// Bytes of a vertex and of a triangle.
+    each: [f64; 2],
+    /// Whether the numbers are those that come out, and no estimate.
+    is_exact: bool,
+}
+
+impl MeshSize {
+    /// The size of a mesh whose vertices have normals and texture coordinates.
+    fn exact(vertices: u32, triangles: u32) -> Self {
+        Self {
+            vertices: f64::from(vertices),
+            triangles: f64::from(triangles),
+            each: [32.0, 12.0],
+            is_exact: true,
+        }
+    }
 }
 
 /// A shape as triangles, in its object space; slots are the object's.
@@ -228,42 +262,56 @@ impl Converter {
     #[must_use]
     pub fn mesh_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
         if let Some(model) = self.meshes.find(scene, object, detail) {
-            return Forecast { bytes: model.mesh.bytes(), bound: model.bound, builds: model.why.clone() };
+            let mesh = &model.mesh;
+            return Forecast {
+                bytes: mesh.bytes(),
+                bound: model.bound,
+                builds: model.why.clone(),
+                triangles: mesh.triangles.len() as u64,
+                vertices: mesh.positions.len() as u64,
+            };
         }
         let scale = scale_of(object);
         let tolerance = detail.in_object(object);
-        let (triangles, bound) = match &*object.shape {
-            Shape::Mesh(mesh) => (mesh.triangles.len() as f64, 0.0),
-            Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
-            Shape::Voxels(voxels) => {
-                (voxel_mesh::count_faces(voxels, &clear_values(scene, object)) as f64 * 2.0, 0.0)
+        let (size, bound) = match &*object.shape {
+            Shape::Mesh(mesh) => {
+                let (vertices, triangles) = (mesh.positions.len() as f64, mesh.triangles.len() as f64);
+                (MeshSize { vertices, triangles, is_exact: true, ..MeshSize::default() }, 0.0)
             }
+            Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
+            Shape::Voxels(voxels) => (voxel_mesh::forecast(voxels, &clear_values(scene, object)), 0.0),
             Shape::FreeForm(form) => {
                 field_mesh::forecast(form, tolerance, detail.max_resolution.min(field_mesh::FINEST))
             }
             Shape::HeightField(field) => height_mesh::forecast(field, tolerance),
-            Shape::Volume(volume) => {
-                (field_mesh::count_surface_cells(volume) as f64 * 2.0, volume.spacing().length())
-            }
+            Shape::Volume(volume) => (field_mesh::forecast_of_volume(volume), volume.spacing().length()),
         };
-        // About one vertex with position, normal and texture coordinates for two triangles.
-        let bytes = (triangles * (12.0 + 0.55 * 32.0)) as u64;
-        Forecast { bytes, bound: bound * scale, builds: format!("about {triangles:.0} triangles") }
+        let bytes = size.vertices * size.each[0] + size.triangles * size.each[1];
+        Forecast {
+            bytes: bytes as u64,
+            bound: bound * scale,
+            builds: format!("{}{:.0} triangles", if size.is_exact { "" } else { "about " }, size.triangles),
+            triangles: size.triangles as u64,
+            vertices: size.vertices as u64,
+        }
     }
 
     /// Tells what [`Converter::voxels`] would make.
     #[must_use]
     pub fn voxels_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
         if let Some(model) = self.voxels.find(scene, object, detail) {
-            return Forecast { bytes: model.voxels.bytes(), bound: model.bound, builds: model.why.clone() };
+            return Forecast::of_grid(model.voxels.bytes(), model.bound, model.why.clone());
         }
         let scale = scale_of(object);
         let tolerance = detail.in_object(object);
         let (size, cell) = voxelize::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
-        let chunks = size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>();
+        let chunks = match &*object.shape {
+            Shape::FreeForm(form) => voxelize::chunks_of_form(form, size, cell),
+            _ => size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>(),
+        };
         let bytes = chunks * u64::from(crate::scene::CHUNK).pow(3);
         let [x, y, z] = size;
-        Forecast { bytes, bound: cell * 3f64.sqrt() * scale, builds: format!("{x}x{y}x{z} voxels") }
+        Forecast::of_grid(bytes, cell * 3f64.sqrt() * scale, format!("{x}x{y}x{z} voxels"))
     }
 
     /// Tells what [`Converter::distance`] would make.
@@ -271,18 +319,19 @@ impl Converter {
     pub fn distance_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
         if let Some(model) = self.distances.find(scene, object, detail) {
             let bytes = model.distances.len() as u64 * 5;
-            return Forecast { bytes, bound: model.bound, builds: model.why.clone() };
+            return Forecast::of_grid(bytes, model.bound, model.why.clone());
         }
         let scale = scale_of(object);
         let tolerance = detail.in_object(object);
-        let (size, step) = distance::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
+        // The grid lies around the triangles that it is made of: cells that are empty have none.
+        let bounds = match &*object.shape {
+            Shape::Voxels(voxels) => filled_bounds(voxels),
+            shape => shape.bounds(),
+        };
+        let (size, step) = distance::grid_size(&bounds, tolerance, detail.max_resolution);
         let bytes = size.iter().map(|&s| u64::from(s)).product::<u64>() * 5;
         let [x, y, z] = size;
-        Forecast {
-            bytes,
-            bound: distance::bound(step) * scale,
-            builds: format!("{x}x{y}x{z} signed distances"),
-        }
+        Forecast::of_grid(bytes, distance::bound(step) * scale, format!("{x}x{y}x{z} signed distances"))
     }
 }
 
@@ -304,6 +353,16 @@ fn scale_of(object: &Object) -> f64 {
 fn extent_of(object: &Object) -> f64 {
     let size = object.shape.bounds().radius();
     if size > 0.0 && size.is_finite() { size } else { 1.0 }
+}
+
+/// Returns the box around the cells that hold something.
+fn filled_bounds(voxels: &Voxels) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
+    voxels.for_each_filled(|cell, _| {
+        let low = DVec3::from_array(cell.map(f64::from));
+        bounds = bounds.with(low).with(low + 1.0);
+    });
+    bounds
 }
 
 /// Tells for each palette byte whether light passes through.
@@ -410,6 +469,50 @@ mod tests {
         assert!(Arc::ptr_eq(&get(&object, 0.0101), &get(&object.clone(), 0.0105)));
         assert!(!Arc::ptr_eq(&get(&object, 0.01), &get(&object, 0.001)));
         assert!(get(&object, 0.01).bound <= 0.01);
+    }
+
+    #[test]
+    fn forecasts_are_what_is_made_then() {
+        let scene = Scene::default();
+        let heights = (0..24 * 17).map(|i| (f64::from(i % 24) * 0.4).sin() as f32).collect();
+        let form = |center: f64| crate::scene::Form::Ellipsoid {
+            center: DVec3::X * center,
+            radii: DVec3::new(1.0, 0.7, 0.8),
+        };
+        let union = crate::scene::Form::Union(vec![form(0.0), form(0.9)]);
+        let ball = |x: u32, y: u32, z: u32| {
+            let p = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) - 11.5;
+            u8::from(p.length() < 11.0)
+        };
+        // Share by which bytes may be off: what has a formula is exact, what must be found on a grid is not.
+        let shapes: Vec<(Shape, f64)> = vec![
+            (Shape::Primitive(Primitive::Sphere { radius: 1.0 }), 0.0),
+            (Shape::Primitive(Primitive::Torus { major: 1.0, minor: 0.3 }), 0.0),
+            (Shape::Primitive(Primitive::Cylinder { radius: 1.0, height: 2.0 }), 0.0),
+            (Shape::Primitive(Primitive::Cone { radius: 1.0, height: 2.0 }), 0.0),
+            (Shape::Primitive(Primitive::Box { size: DVec3::ONE }), 0.0),
+            (Shape::Primitive(Primitive::Plane { width: 1.0, depth: 2.0 }), 0.0),
+            (Shape::Primitive(Primitive::prism(7, 1.0, 2.0)), 0.0),
+            (Shape::Primitive(Primitive::pyramid(5, 1.0, 2.0)), 0.0),
+            (
+                Shape::HeightField(
+                    crate::scene::HeightField::new(24, 17, glam::DVec2::ONE, heights).unwrap(),
+                ),
+                0.0,
+            ),
+            (Shape::Voxels(Voxels::from_fn([24; 3], ball)), 0.02),
+            (Shape::FreeForm(crate::scene::FreeForm::new(union).unwrap()), 0.1),
+        ];
+        for (shape, slack) in shapes {
+            let object = Object::new("thing", shape, 0);
+            for tolerance in [0.05, 0.004] {
+                let detail = Detail { tolerance, max_resolution: 256 };
+                let planned = Converter::default().mesh_forecast(&scene, &object, detail);
+                let made = Converter::default().mesh(&scene, &object, detail, &OneThread).unwrap();
+                let off = planned.bytes as f64 / made.mesh.bytes() as f64 - 1.0;
+                assert!(off.abs() <= slack, "{:?} at {tolerance}: {off}", object.shape.kind());
+            }
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod plan;
 mod registry;
 mod renderer;
 mod report;
+mod survey;
 
 pub use control::{Cancelled, Control, Watcher};
 pub use demand::{Demand, Surfaces, blocks_light, detail, left_out, why_not_drawn};
@@ -19,3 +20,4 @@ pub use plan::{Decision, ObjectPlan, PassPlan, Plan};
 pub use registry::{BackendFactory, Origin, Registry, UnknownBackend};
 pub use renderer::{Prepared, RenderError, Renderer};
 pub use report::{Counter, Phases, Report};
+pub use survey::Survey;
