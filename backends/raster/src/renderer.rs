@@ -10,9 +10,10 @@ use crate::lens::Lens;
 use crate::light::{Illumination, Lamp};
 use crate::lines::Lines;
 use crate::model::{Model, Role, Source};
-use crate::paint::{self, Announce, Painter};
+use crate::paint::{self, Announce, Look, Painter};
 use crate::plan::plan;
 use crate::shadow::{MapSizes, Shadows};
+use crate::smooth;
 use crate::strokes::Strokes;
 use crate::tile::TileGrid;
 use crate::transform::{ScreenVertex, transform};
@@ -63,6 +64,8 @@ struct Ready {
     /// Made when they are drawn.
     lines: Option<Arc<Lines>>,
     lamps: Vec<Lamp>,
+    /// Of samples in a pixel, in steps from its center.
+    places: Vec<[i32; 2]>,
     shadows: Option<Arc<Shadows>>,
     /// Those of a mode without shadows, which may be switched back.
     resting_shadows: Option<Arc<Shadows>>,
@@ -219,6 +222,7 @@ impl Renderer for Raster {
             given,
             lines,
             lamps,
+            places: smooth::places(options.samples),
             shadows: None,
             resting_shadows: None,
             sizes,
@@ -359,12 +363,13 @@ fn draw(
 ) -> Result<(), Cancelled> {
     control.check()?;
     let culls_back = ready.options.culls_back;
-    let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, without: None };
+    let smooth = ready.places.len() > 1;
+    let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, smooth, without: None };
     // 1. Where on the picture is every vertex?
     transform(&ready.model, lens, vertices, control.threads);
     work.phases.end("transform");
     // 2. Clip, set up, and sort the triangles into tiles.
-    bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height), control.threads);
+    bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height).smooth(smooth), control.threads);
     work.triangles += bins.triangles();
     let drawing = ready.lines.as_deref().map(|lines| {
         strokes.fill(lines, &ready.model, lens, vertices, culls_back, control.threads);
@@ -379,7 +384,8 @@ fn draw(
         shadows: ready.shadows.as_deref(),
         lighting: ready.options.lighting.unwrap_or(ready.scene.environment.lighting),
     };
-    let painter = Painter::new(light, ready.options.shading, lens, bins, drawing, target.channels());
+    let look = Look { shading: ready.options.shading, places: &ready.places, drawing };
+    let painter = Painter::new(light, look, lens, bins, target.channels());
     work.shaded += painter.paint(target, bands, announce, control)?;
     if painter.paint_crossings(target, bands, control) && announce == Announce::Yes {
         control.finished(&target.band());

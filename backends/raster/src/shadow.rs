@@ -15,7 +15,7 @@
 //! shadows*, Computers & Graphics 9(3), 1985; comparing planes instead of equal names is ours.
 
 use crate::batch::{BATCH, OCTETS};
-use crate::bin::{Bins, Pass};
+use crate::bin::{Bins, Pass, Without};
 use crate::casters::Casters;
 use crate::face::{Face, Place};
 use crate::lens::{Lens, Rays, cube_axes, cube_face};
@@ -189,7 +189,8 @@ impl Shadows {
                     control.check()?;
                     lens.origin += origin;
                     let role = Role::Light;
-                    let pass = Pass { model, lens: &lens, role, culls_back: false, without: Some(&left_out) };
+                    let (culls_back, without) = (false, Some(&left_out as &dyn Without));
+                    let pass = Pass { model, lens: &lens, role, culls_back, smooth: false, without };
                     transform(model, &lens, vertices, control.threads);
                     let grid = TileGrid::new(lens.width, lens.height);
                     bins.fill(&pass, vertices, &grid, control.threads);
