@@ -102,7 +102,7 @@ fn a_camera_given_as_a_table_of_directions_is_drawn_by_every_back_end() {
     let mut studio = studio(2);
     let reference = studio.draw("reference", &scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
     let drawn = reference.id().iter().filter(|id| **id != 0).count();
-    assert!(drawn > 5000 && drawn < 320 * 180, "{drawn} pixels show something");
+    assert!(drawn > 1500 && drawn < 320 * 180, "{drawn} pixels show something");
     for (backend, least) in [("raster", 0.98), ("freeform", 0.995), ("stylized", 0.98)] {
         let picture = studio.draw(backend, &scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
         let agreement = Errors::between(&picture, &reference).id_agreement.unwrap_or(0.0);

@@ -130,7 +130,7 @@ mod tests {
         };
         assert!(names("freeform").is_empty(), "height fields are drawn as given");
         assert_eq!(names("reference"), ["samples"]);
-        assert_eq!(names("raster"), [TOLERANCE, "shadow.map_size"]);
+        assert_eq!(names("raster"), [TOLERANCE, "shadow.map_size", "samples"]);
     }
 
     #[test]

@@ -113,21 +113,24 @@ fn dragging_turns_the_camera_of_all_panes() {
 #[test]
 fn a_parameter_changes_the_picture_and_is_kept() {
     let mut harness = window("polyhedra");
+    drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
+    press(&mut harness, Key::Num3);
+    assert_eq!(harness.state().shown().next(), Some("voxel"));
     let before = harness.state().picture(0).unwrap().0.to_vec();
     harness.get_by_label("Settings").click();
     rest(&mut harness);
     drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
     harness.get_by_role(Role::CheckBox).click();
     rest(&mut harness);
-    let set = |harness: &Harness<'_, Viewer>| harness.state().settings("raster").iter().count();
+    let set = |harness: &Harness<'_, Viewer>| harness.state().settings("voxel").iter().count();
     assert_eq!(set(&harness), 1);
     assert_ne!(before, harness.state().picture(0).unwrap().0, "no shadows any more");
-    for key in [Key::Num3, Key::Num2] {
+    for key in [Key::Num2, Key::Num3] {
         // Keys act on the pane under the mouse, and panels differ in width.
         drag(&mut harness, Pos2::new(60.0, 200.0), Pos2::new(60.0, 200.0));
         press(&mut harness, key);
     }
-    assert_eq!(harness.state().shown().next(), Some("raster"));
+    assert_eq!(harness.state().shown().next(), Some("voxel"));
     assert_eq!(set(&harness), 1, "what was set is still set");
 }
 

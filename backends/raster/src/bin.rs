@@ -4,9 +4,9 @@
 //! and sorted into tiles by one thread, so bins hold the same records in the same order on any number of them.
 
 use crate::clip::clip;
-use crate::lens::{Lens, ScreenFromObject};
+use crate::lens::Lens;
 use crate::model::{Class, Model, Part, Role};
-use crate::setup::{DepthPlane, Record, ScreenPoint, Sides};
+use crate::setup::{DepthPlane, Record, STEPS, ScreenPoint};
 use crate::tile::{Placed, TileGrid};
 use crate::transform::{ScreenVertex, border};
 use polyptych_core::parallel::{Threads, for_each_mut};
@@ -25,6 +25,8 @@ pub(crate) struct Pass<'a> {
     pub(crate) role: Role,
     /// Whether sides that look away are left out.
     pub(crate) culls_back: bool,
+    /// Whether triangles count that cover no pixel's center, but another place in it.
+    pub(crate) smooth: bool,
     /// Leaves out triangles of one part, given by their corners in object space.
     pub(crate) without: Option<&'a dyn Without>,
 }
@@ -137,6 +139,7 @@ impl Run {
         let mesh = part.mesh();
         let screen_from_object = pass.lens.for_object(&part.world_from_object);
         let vertices = &vertices[part.first_vertex..];
+        let reach = if pass.smooth { STEPS / 2 } else { 0 };
         for triangle in triangles {
             let slot = mesh.slot(triangle);
             let class = part.class(pass.role, slot);
@@ -160,24 +163,15 @@ impl Run {
             if any & border::CLIPPING == 0 {
                 let point = |v: &ScreenVertex| ScreenPoint { x: v.x, y: v.y, depth: v.depth };
                 let points = [point(a), point(b), point(c)];
-                records.extend(Record::new(&points, DepthPlane::through(&points), id, sides));
+                records.extend(Record::new(&points, DepthPlane::through(&points), id, sides, reach));
             } else {
-                clip_into(records, pass.lens, &screen_from_object, mesh.corners(triangle), id, sides);
+                let corners = mesh.corners(triangle).map(|p| screen_from_object.apply(p.as_dvec3()));
+                clip(pass.lens, corners, |points, plane| {
+                    records.extend(Record::new(&points, plane, id, sides, reach));
+                });
             }
         }
     }
-}
-
-fn clip_into(
-    records: &mut Vec<Record>,
-    lens: &Lens,
-    screen_from_object: &ScreenFromObject,
-    corners: [glam::Vec3; 3],
-    id: u32,
-    sides: Sides,
-) {
-    let corners = corners.map(|p| screen_from_object.apply(p.as_dvec3()));
-    clip(lens, corners, |points, plane| records.extend(Record::new(&points, plane, id, sides)));
 }
 
 impl<T> Default for Bin<T> {

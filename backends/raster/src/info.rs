@@ -1,5 +1,6 @@
 //! What does the back end say of itself, and what can be set?
 
+use crate::smooth;
 use polyptych_core::framebuffer::Channels;
 use polyptych_core::scene::{LightingModel, ShapeKind};
 use polyptych_core::seam::{BackendInfo, Need, Parameter, ParameterKind, Value};
@@ -8,6 +9,7 @@ use polyptych_core::seam::{BackendInfo, Need, Parameter, ParameterKind, Value};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Options {
     pub(crate) map_size: u32,
+    pub(crate) samples: u32,
     pub(crate) mode: Mode,
     pub(crate) shading: Shading,
     /// Nothing for that of the scene.
@@ -66,6 +68,7 @@ impl Options {
         let (settings, declared) = (&need.settings, &info.parameters);
         Self {
             map_size: settings.int(declared, "shadow.map_size").clamp(256, 8192) as u32,
+            samples: need.samples.max(settings.int(declared, "samples") as u32).clamp(1, smooth::MOST),
             mode: named(&MODES, settings.text(declared, "mode")),
             shading: named(&SHADINGS, settings.text(declared, "shading")),
             lighting: named(&LIGHTINGS, settings.text(declared, "lighting")),
@@ -108,6 +111,15 @@ pub(crate) fn info() -> BackendInfo {
                 unit: "texels",
                 help: "Edge of a directional light's shadow map; those of other lights are at most half of it",
                 tag: "shadow.quality",
+                quality_axis: true,
+            },
+            Parameter {
+                name: "samples",
+                kind: ParameterKind::Int { min: 1, max: smooth::MOST as i64 },
+                default: Value::Int(1),
+                unit: "",
+                help: "Places in a pixel that are looked at for edges; each triangle of a pixel is shaded once",
+                tag: "samples",
                 quality_axis: true,
             },
             choice(

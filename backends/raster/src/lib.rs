@@ -15,6 +15,7 @@
 //!  face       a visible triangle set up once a tile: where rays meet it, normals, texture with its mip level
 //!  batch      32 visible pixels at once: distances, places, unit normals
 //!  light      the lighting equation of the core over a batch, with shadows
+//!  smooth     edges: triangles that share a pixel, by several places in it
 //!  paint      the steps of a tile, and the pixel's channels
 //!  lines      edges of faces, and free segments                   (prepare, for modes that draw them)
 //!  strokes    lines on the picture: which of their pixels nothing hides
@@ -29,7 +30,9 @@
 //! Of equal depths (`1/w`, rounded to `f32`) the lower triangle of the lower object wins, so pictures do not
 //! depend on the order of drawing. Shadow edges are exact where triangles are larger than a texel of the map.
 //!
-//! **Color** is that of the pixel's center whatever number of samples is asked for, and coverage is 0 or 1.
+//! **Color** of more than one sample is multisampled: each triangle of a pixel is shaded once, at the pixel's center,
+//! and weighs as many of the places in the pixel as show it. Edges are smooth; what is finer within a triangle
+//! (highlights, edges of shadows) is not. Coverage is the share of places that show something.
 
 mod batch;
 mod bin;
@@ -53,6 +56,7 @@ mod plan;
 mod renderer;
 mod setup;
 mod shadow;
+mod smooth;
 mod strokes;
 #[cfg(test)]
 mod tests;

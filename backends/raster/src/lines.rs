@@ -125,7 +125,7 @@ mod tests {
             .objects
             .push(Object { shape: shape.clone(), ..Object::new("mesh", Shape::Mesh(Mesh::default()), 0) });
         let mut model = Model::default();
-        assert!(model.add(&scene, 0, crate::model::Source::Given(shape)));
+        assert!(model.add(&scene, 0, crate::model::Source::Given(shape), None));
         Lines::of(&model)
     }
 

@@ -40,6 +40,8 @@ pub(crate) struct Part {
     pub(crate) first_vertex: usize,
     /// In the world.
     pub(crate) bounds: Aabb,
+    /// Largest coordinate that went into a corner.
+    reach: f64,
     /// How each slot looks to the camera and to lights.
     classes: Vec<[Class; 2]>,
     /// Whether light can be blocked on its way to it.
@@ -116,8 +118,15 @@ impl Source {
 }
 
 impl Model {
-    /// Adds an object; false when its triangles cannot be numbered any more.
-    pub(crate) fn add(&mut self, scene: &Scene, index: usize, source: Source) -> bool {
+    /// Returns the part of an object.
+    pub(crate) fn part_of(&self, object: usize) -> Option<&Part> {
+        let at = self.parts.binary_search_by_key(&object, |part| part.object).ok()?;
+        Some(&self.parts[at])
+    }
+
+    /// Adds an object; false when its triangles cannot be numbered any more. `before` is a part that may be made
+    /// from the same triangles at the same place: those are not measured again.
+    pub(crate) fn add(&mut self, scene: &Scene, index: usize, source: Source, before: Option<&Part>) -> bool {
         let object = &scene.objects[index];
         let mesh = source.mesh();
         let Ok(count) = u32::try_from(mesh.triangles.len()) else { return false };
@@ -125,18 +134,15 @@ impl Model {
             return false;
         };
         let vertices = mesh.positions.len();
-        let own_bounds = mesh.bounds();
-        // Of the corners, not of the box: that of a turned box would be larger.
-        let used = mesh.triangles.iter().flatten().chain(mesh.segments.iter().flatten());
-        let corners = used.map(|&i| mesh.positions[i as usize].as_dvec3());
-        let bounds = Aabb::of_points(corners.map(|p| object.world_from_object.transform_point3(p)));
         let matrix = object.world_from_object.matrix3;
-        let scale = matrix.x_axis.length().max(matrix.y_axis.length()).max(matrix.z_axis.length());
-        if !own_bounds.is_empty() {
-            let farthest = own_bounds.min.abs().max(own_bounds.max.abs()).max_element();
-            self.reach = self.reach.max(farthest * scale);
-            self.bounds = self.bounds.union(bounds);
-        }
+        let (bounds, reach) = match before
+            .filter(|b| b.source.is(&source) && b.world_from_object == object.world_from_object)
+        {
+            Some(before) => (before.bounds, before.reach),
+            None => extent(mesh, &object.world_from_object),
+        };
+        self.reach = self.reach.max(reach);
+        self.bounds = self.bounds.union(bounds);
         self.parts.push(Part {
             object: index,
             world_from_object: object.world_from_object,
@@ -146,6 +152,7 @@ impl Model {
             first_triangle: self.triangles,
             first_vertex: self.vertices,
             bounds,
+            reach,
             classes: classes(scene, object),
             takes_shadow: !matches!(*object.shape, Shape::Volume(_)),
             one_sided_layers: matches!(*object.shape, Shape::Voxels(_)),
@@ -210,6 +217,21 @@ impl Part {
             && self.first_triangle == other.first_triangle
             && self.classes == other.classes
     }
+}
+
+/// Returns bounds in the world and the largest coordinate that goes into a corner.
+fn extent(mesh: &Mesh, world_from_object: &DAffine3) -> (Aabb, f64) {
+    let own_bounds = mesh.bounds();
+    if own_bounds.is_empty() {
+        return (Aabb::EMPTY, 0.0);
+    }
+    // Of the corners, not of the box: that of a turned box would be larger.
+    let used = mesh.triangles.iter().flatten().chain(mesh.segments.iter().flatten());
+    let corners = used.map(|&i| mesh.positions[i as usize].as_dvec3());
+    let bounds = Aabb::of_points(corners.map(|p| world_from_object.transform_point3(p)));
+    let matrix = &world_from_object.matrix3;
+    let scale = matrix.x_axis.length().max(matrix.y_axis.length()).max(matrix.z_axis.length());
+    (bounds, own_bounds.min.abs().max(own_bounds.max.abs()).max_element() * scale)
 }
 
 fn normal_matrix(world_from_object: &DMat3) -> Mat3 {

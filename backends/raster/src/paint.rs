@@ -9,6 +9,7 @@ use crate::info::Shading;
 use crate::layers::{Fragment, collect, sort};
 use crate::lens::Lens;
 use crate::light::{Illumination, Wants};
+use crate::smooth::Smooth;
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH, TileArea, TileBuffer, TileGrid};
 use glam::Vec3;
 use polyptych_core::camera::RowDirections;
@@ -20,7 +21,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Behind layers that let less than this share of light through nothing is drawn.
-const OPAQUE: f32 = 1.0 / 1024.0;
+pub(crate) const OPAQUE: f32 = 1.0 / 1024.0;
 
 /// Draws a picture from filled bins.
 pub(crate) struct Painter<'a> {
@@ -30,9 +31,19 @@ pub(crate) struct Painter<'a> {
     /// The lines to draw instead of light.
     pub(crate) drawing: Option<Drawing<'a>>,
     shading: Shading,
+    pub(crate) places: &'a [[i32; 2]],
     wants: Wants,
     ask: Ask,
     pub(crate) channels: Channels,
+}
+
+/// How a picture is to look.
+#[derive(Clone, Copy)]
+pub(crate) struct Look<'a> {
+    pub(crate) shading: Shading,
+    /// Places in a pixel, in steps from its center.
+    pub(crate) places: &'a [[i32; 2]],
+    pub(crate) drawing: Option<Drawing<'a>>,
 }
 
 /// Scratch memory of a band.
@@ -40,7 +51,8 @@ pub(crate) struct Painter<'a> {
 pub(crate) struct Scratch {
     fragments: Vec<Fragment>,
     pub(crate) faces: Faces,
-    corners: Gouraud,
+    pub(crate) corners: Gouraud,
+    pub(crate) smooth: Smooth,
     /// The triangles that the band shows, row by row: of drawings whose surfaces hide.
     pub(crate) seen: Vec<u32>,
 }
@@ -51,6 +63,7 @@ impl Scratch {
         self.fragments.capacity() * size_of::<Fragment>()
             + self.faces.bytes()
             + self.corners.bytes()
+            + self.smooth.bytes()
             + self.seen.capacity() * 4
     }
 }
@@ -65,12 +78,12 @@ pub(crate) enum Announce {
 impl<'a> Painter<'a> {
     pub(crate) fn new(
         light: Illumination<'a>,
-        shading: Shading,
+        look: Look<'a>,
         lens: &'a Lens,
         bins: &'a Bins,
-        drawing: Option<Drawing<'a>>,
         channels: Channels,
     ) -> Self {
+        let Look { shading, places, drawing } = look;
         let lit = drawing.is_none();
         let wants = Wants {
             color: lit && channels.has(Channel::Color),
@@ -78,7 +91,7 @@ impl<'a> Painter<'a> {
         };
         // Opacity decides what is seen first, so it is asked for wherever there are layers.
         let ask = if wants.color || channels.has(Channel::Albedo) { Ask::Color } else { Ask::Geometry };
-        Self { light, lens, bins, drawing, shading, wants, ask, channels }
+        Self { light, lens, bins, drawing, shading, places, wants, ask, channels }
     }
 
     /// Draws all bands, each with scratch memory of its own. Returns how many pixels were shaded.
@@ -169,6 +182,10 @@ impl<'a> Painter<'a> {
             }
         }
         let shaded = self.resolve(&area, &buffer, band, scratch);
+        let smooths = self.wants.color || self.channels.has(Channel::Coverage);
+        if self.places.len() > 1 && smooths && self.drawing.is_none() {
+            return shaded + self.smooth(tile, &area, &buffer.id, band, scratch);
+        }
         if let Some(drawing) = self.drawing {
             self.draw_lines(&drawing, tile, &area, &buffer.id, band, scratch);
         }
@@ -236,7 +253,7 @@ impl<'a> Painter<'a> {
 
     /// Finds and lights the surfaces of a batch.
     #[inline(always)]
-    fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
+    pub(crate) fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
         let light = &self.light;
         // Opacity decides what is seen first.
         let layered = batch.tag[..batch.count].iter().any(|tag| tag & LAYER != 0);
@@ -268,7 +285,7 @@ impl<'a> Painter<'a> {
 }
 
 /// Flags of a sample's tag, above the pixel's index in the tile.
-const LAYER: u32 = 1 << 16;
+pub(crate) const LAYER: u32 = 1 << 16;
 const LAST: u32 = 1 << 17;
 
 /// Lists what a tile shows, pixel by pixel and front to back.
@@ -430,6 +447,6 @@ impl<'a> TilePainter<'_, 'a, '_> {
     }
 }
 
-fn finite(v: Vec3) -> Vec3 {
+pub(crate) fn finite(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
 }

@@ -10,16 +10,17 @@ use crate::lens::Lens;
 use crate::light::{Illumination, Lamp};
 use crate::lines::Lines;
 use crate::model::{Model, Role, Source};
-use crate::paint::{self, Announce, Painter};
+use crate::paint::{self, Announce, Look, Painter};
 use crate::plan::plan;
-use crate::shadow::{MapSizes, Shadows};
+use crate::shadow::{Before, MapSizes, Shadows};
+use crate::smooth;
 use crate::strokes::Strokes;
 use crate::tile::TileGrid;
 use crate::transform::{ScreenVertex, transform};
 use polyptych_core::camera::Camera;
 use polyptych_core::convert::Converter;
-use polyptych_core::framebuffer::Framebuffer;
-use polyptych_core::scene::{Light, Object, Scene, Shape};
+use polyptych_core::framebuffer::{Channel, Framebuffer};
+use polyptych_core::scene::{Object, Scene, Shape};
 use polyptych_core::seam::{
     BackendFactory, BackendInfo, Cancelled, Control, Counter, Decision, Frame, Need, Phases, Plan, Prepared,
     Registry, RenderError, Renderer, Report,
@@ -63,6 +64,8 @@ struct Ready {
     /// Made when they are drawn.
     lines: Option<Arc<Lines>>,
     lamps: Vec<Lamp>,
+    /// Of samples in a pixel, in steps from its center.
+    places: Vec<[i32; 2]>,
     shadows: Option<Arc<Shadows>>,
     /// Those of a mode without shadows, which may be switched back.
     resting_shadows: Option<Arc<Shadows>>,
@@ -140,23 +143,24 @@ impl Raster {
             Arc::ptr_eq(&before.scene, scene)
                 && before.model.has_sources(sources.iter().filter_map(|s| s.as_ref().ok()))
         };
-        let before = before.filter(is_same);
+        let same = before.filter(is_same);
         let decide = |(object, source): (&Object, &Result<Source, String>)| match source {
             Err(why) => Decision::Skipped { why: why.clone() },
             Ok(source) => {
                 decide::decision(object, source.converted(), decide::losses(scene, object, draws_lines))
             }
         };
-        let decisions = match before.filter(|b| b.options.mode.draws_lines() == draws_lines) {
+        let decisions = match same.filter(|b| b.options.mode.draws_lines() == draws_lines) {
             Some(before) => before.given.clone(),
             None => scene.objects.iter().zip(&sources).map(decide).collect(),
         };
-        if let Some(before) = before {
+        if let Some(before) = same {
             return Ok((before.model.clone(), decisions));
         }
         let mut model = Model::default();
         for (index, source) in sources.into_iter().enumerate() {
-            if source.is_ok_and(|source| !model.add(scene, index, source)) {
+            let part = before.and_then(|b| b.model.part_of(index));
+            if source.is_ok_and(|source| !model.add(scene, index, source, part)) {
                 return Err(RenderError::Failed(format!("more than {} triangles", u32::MAX)));
             }
         }
@@ -205,9 +209,13 @@ impl Renderer for Raster {
         let (model, given) = self.build_model(before.as_ref(), scene, need, converter, control)?;
         let mut lamps = Lamp::all(scene);
         let demand = decide::demand(scene, need, &lamps, options);
-        for (lamp, shadow) in lamps.iter_mut().zip(&demand.shadows) {
+        // What stands before a light depends neither on the mode nor on the channels, which may change back.
+        let all = Need { channels: need.channels.with(Channel::Color), ..need.clone() };
+        let of_all = decide::demand(scene, &all, &lamps, Options { mode: Mode::Shadowed, ..options });
+        for (lamp, shadow) in lamps.iter_mut().zip(&of_all.shadows) {
             lamp.is_blocked = shadow.is_ok();
         }
+        let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
         let sizes = MapSizes::new(options.map_size, &lamps);
         let mut decisions = given.to_vec();
         for loss in decide::losses_of_all(scene, &lamps, options, sizes) {
@@ -221,6 +229,7 @@ impl Renderer for Raster {
             given,
             lines,
             lamps,
+            places: smooth::places(options.samples),
             shadows: None,
             resting_shadows: None,
             sizes,
@@ -229,14 +238,14 @@ impl Renderer for Raster {
             decisions: decisions.into(),
             as_drawn: OnceLock::new(),
         };
-        let kept = before.and_then(|b| b.shadows_for(&ready));
+        let (kept, old) = before.map_or((None, None), |b| b.shadows_for(&ready));
         if demand.any_shadow() {
             ready.shadows = Some(match kept {
                 Some(kept) => kept,
-                None => Arc::new(self.scratch.draw_shadows(&ready, control)?),
+                None => Arc::new(self.scratch.draw_shadows(&ready, old, control)?),
             });
-        } else {
-            // They may be wanted again.
+        } else if options.mode != Mode::Shadowed && asked {
+            // Another mode may want them again.
             ready.resting_shadows = kept;
         }
         let prepared = Prepared { objects: ready.decisions(&need.camera), bytes: ready.bytes() };
@@ -339,9 +348,15 @@ impl Scratch {
         Ok(())
     }
 
-    fn draw_shadows(&mut self, ready: &Ready, control: &Control<'_>) -> Result<Shadows, Cancelled> {
+    fn draw_shadows(
+        &mut self,
+        ready: &Ready,
+        old: Option<Before>,
+        control: &Control<'_>,
+    ) -> Result<Shadows, Cancelled> {
         let (vertices, bins) = (&mut self.vertices, &mut self.bins);
-        Shadows::build(&ready.scene, &ready.model, &ready.lamps, ready.sizes, vertices, bins, control)
+        let of = (&*ready.scene, &*ready.model);
+        Shadows::build(of, &ready.lamps, ready.sizes, old, vertices, bins, control)
     }
 
     fn bytes(&self) -> u64 {
@@ -368,12 +383,13 @@ fn draw(
 ) -> Result<(), Cancelled> {
     control.check()?;
     let culls_back = ready.options.culls_back;
-    let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, without: None };
+    let smooth = ready.places.len() > 1;
+    let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, smooth, without: None };
     // 1. Where on the picture is every vertex?
     transform(&ready.model, lens, vertices, control.threads);
     work.phases.end("transform");
     // 2. Clip, set up, and sort the triangles into tiles.
-    bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height), control.threads);
+    bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height).smooth(smooth), control.threads);
     work.triangles += bins.triangles();
     let drawing = ready.lines.as_deref().map(|lines| {
         strokes.fill(lines, &ready.model, lens, vertices, culls_back, control.threads);
@@ -388,7 +404,8 @@ fn draw(
         shadows: ready.shadows.as_deref(),
         lighting: ready.options.lighting.unwrap_or(ready.scene.environment.lighting),
     };
-    let painter = Painter::new(light, ready.options.shading, lens, bins, drawing, target.channels());
+    let look = Look { shading: ready.options.shading, places: &ready.places, drawing };
+    let painter = Painter::new(light, look, lens, bins, target.channels());
     work.shaded += painter.paint(target, bands, announce, control)?;
     if painter.paint_crossings(target, bands, control) && announce == Announce::Yes {
         control.finished(&target.band());
@@ -421,17 +438,29 @@ impl Ready {
             + self.lines.as_ref().map_or(0, |lines| lines.bytes())
     }
 
-    /// Returns the shadow maps if they are those of another scene, too: same lights, same things that block.
-    fn shadows_for(self, other: &Self) -> Option<Arc<Shadows>> {
-        let lights = |r: &Self| r.lamps.iter().map(|l| l.light.clone()).collect::<Vec<Light>>();
+    /// Returns the shadow maps if they are those of another scene, too: same lights, same things that block. Where
+    /// some are not, returns them with what is still right.
+    fn shadows_for(self, other: &Self) -> (Option<Arc<Shadows>>, Option<Before>) {
+        let Some(shadows) = self.shadows.or(self.resting_shadows) else { return (None, None) };
         let same_parts = self.model.parts.len() == other.model.parts.len()
             && self.model.parts.iter().zip(&other.model.parts).all(|(a, b)| a.blocks_like(b));
-        let same_cells = self.lamps.iter().zip(&other.lamps).all(|(a, b)| a.cell == b.cell);
         let has_masks =
             other.scene.materials.iter().any(|m| m.alpha != polyptych_core::scene::AlphaMode::Opaque);
         let same_masks = !has_masks || Arc::ptr_eq(&self.scene, &other.scene);
-        let same = self.sizes == other.sizes && same_parts && same_cells && same_masks;
-        if same && lights(&self) == lights(other) { self.shadows.or(self.resting_shadows) } else { None }
+        let same_map = |(a, b): (&Lamp, &Lamp)| {
+            same_parts
+                && same_masks
+                && self.sizes == other.sizes
+                && a.light == b.light
+                && a.cell == b.cell
+                && a.is_blocked == b.is_blocked
+        };
+        let same_maps: Vec<bool> = self.lamps.iter().zip(&other.lamps).map(same_map).collect();
+        if self.lamps.len() == other.lamps.len() && same_parts && same_maps.iter().all(|same| *same) {
+            return (Some(shadows), None);
+        }
+        let shadows = Arc::try_unwrap(shadows).ok();
+        (None, shadows.map(|shadows| Before { shadows, same_blockers: same_parts, same_maps }))
     }
 
     /// Returns the scene with converted shapes as meshes. Polyhedra and voxels are drawn by their true faces

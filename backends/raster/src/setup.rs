@@ -84,7 +84,15 @@ impl Record {
     ///
     /// Triangles seen from the edge are kept while their snapped corners have area: without them pixels between
     /// their neighbors would stay open.
-    pub(crate) fn new(points: &[ScreenPoint; 3], plane: DepthPlane, id: u32, sides: Sides) -> Option<Self> {
+    ///
+    /// `reach` is how far from a pixel's center it may be looked at, in steps.
+    pub(crate) fn new(
+        points: &[ScreenPoint; 3],
+        plane: DepthPlane,
+        id: u32,
+        sides: Sides,
+        reach: i32,
+    ) -> Option<Self> {
         let steps = f64::from(STEPS);
         let [a, b, c] = points;
         let mut x = [round(a.x * steps), round(b.x * steps), round(c.x * steps)];
@@ -99,7 +107,7 @@ impl Record {
         if !drawn {
             return None;
         }
-        let pixels = |v: &[i32; 3]| first_pixel(v) <= last_pixel(v);
+        let pixels = |v: &[i32; 3]| first_pixel(&v.map(|v| v - reach)) <= last_pixel(&v.map(|v| v + reach));
         if !(pixels(&x) && pixels(&y)) {
             return None;
         }
@@ -122,6 +130,12 @@ impl Record {
             nearest: depths[0].max(depths[1]).max(depths[2]) as f32,
             id,
         })
+    }
+
+    /// Returns the triangle as it covers places that lie so many steps from the pixels' centers.
+    #[inline(always)]
+    pub(crate) fn seen_from(&self, place: [i32; 2]) -> Self {
+        Self { x: self.x.map(|x| x - place[0]), y: self.y.map(|y| y - place[1]), ..*self }
     }
 
     /// Returns the first and last column and row whose pixel centers can be covered; maybe none.

@@ -15,7 +15,7 @@
 //! shadows*, Computers & Graphics 9(3), 1985; comparing planes instead of equal names is ours.
 
 use crate::batch::{BATCH, OCTETS};
-use crate::bin::{Bins, Pass};
+use crate::bin::{Bins, Pass, Without};
 use crate::casters::Casters;
 use crate::face::{Face, Place};
 use crate::lens::{Lens, Rays, cube_axes, cube_face};
@@ -164,13 +164,23 @@ fn faces_of(kind: &LightKind) -> u64 {
     }
 }
 
+/// Maps of before.
+pub(crate) struct Before {
+    pub(crate) shadows: Shadows,
+    /// Whether the triangles that block are the same.
+    pub(crate) same_blockers: bool,
+    /// For each lamp whether its map is the same.
+    pub(crate) same_maps: Vec<bool>,
+}
+
 impl Shadows {
-    /// Draws the maps of all lights that cast shadows.
+    /// Draws the maps of all lights that cast shadows, but for those that are still right. The memory of others is
+    /// used again: fresh pages cost more than what is drawn into them.
     pub(crate) fn build(
-        scene: &Scene,
-        model: &Model,
+        (scene, model): (&Scene, &Model),
         lamps: &[Lamp],
         sizes: MapSizes,
+        before: Option<Before>,
         vertices: &mut Vec<ScreenVertex>,
         bins: &mut Bins,
         control: &Control<'_>,
@@ -178,9 +188,28 @@ impl Shadows {
         let origin = model.bounds.center();
         let tolerance = ON_PLANE * model.reach.max(model.bounds.radius());
         let casters = Casters::of(model, tolerance);
-        let blockers = blockers(model, origin, control.threads);
+        let (mut spare, mut old_blockers, mut old_maps) = (Vec::new(), Vec::new(), Vec::new());
+        let mut same_blockers = false;
+        if let Some(before) = before {
+            (old_blockers, same_blockers) = (before.shadows.blockers, before.same_blockers);
+            for (map, same) in before.shadows.maps.into_iter().zip(before.same_maps) {
+                if same {
+                    old_maps.push(Some(map));
+                } else {
+                    old_maps.push(None);
+                    spare.extend(map.faces.into_iter().map(|face| face.tiles));
+                }
+            }
+        }
+        let blockers =
+            if same_blockers { old_blockers } else { blockers(model, origin, old_blockers, control.threads) };
         let mut shadows = Self { origin, maps: Vec::with_capacity(lamps.len()), blockers, tolerance };
+        let mut old_maps = old_maps.into_iter();
         for lamp in lamps {
+            if let Some(map) = old_maps.next().flatten() {
+                shadows.maps.push(map);
+                continue;
+            }
             let mut map = Map::default();
             let (bounds, left_out) = casters.of_light(model, &lamp.light.kind, lamp.cell);
             if lamp.is_blocked && !bounds.is_empty() {
@@ -189,11 +218,14 @@ impl Shadows {
                     control.check()?;
                     lens.origin += origin;
                     let role = Role::Light;
-                    let pass = Pass { model, lens: &lens, role, culls_back: false, without: Some(&left_out) };
+                    let (culls_back, without) = (false, Some(&left_out as &dyn Without));
+                    let pass = Pass { model, lens: &lens, role, culls_back, smooth: false, without };
                     transform(model, &lens, vertices, control.threads);
                     let grid = TileGrid::new(lens.width, lens.height);
                     bins.fill(&pass, vertices, &grid, control.threads);
-                    let tiles = draw(scene, &pass, bins, &grid, control.threads);
+                    let mut tiles: Vec<[u32; TILE_PIXELS]> = spare.pop().unwrap_or_default();
+                    tiles.resize(grid.count(), [NO_TRIANGLE; TILE_PIXELS]);
+                    draw(scene, &pass, bins, &grid, &mut tiles, control.threads);
                     lens.origin -= origin;
                     map.faces.push(MapFace { lens, grid, tiles });
                 }
@@ -213,6 +245,12 @@ impl Shadows {
             }
         };
         (map, size_of::<Blocker>() as u64)
+    }
+
+    /// Returns where the maps are in memory, to tell whether they were kept.
+    #[cfg(test)]
+    pub(crate) fn memory(&self) -> Vec<*const [u32; TILE_PIXELS]> {
+        self.maps.iter().flat_map(|map| &map.faces).map(|face| face.tiles.as_ptr()).collect()
     }
 
     /// Returns the bytes held.
@@ -341,8 +379,10 @@ impl MapFace {
     }
 }
 
-fn blockers(model: &Model, origin: DVec3, threads: &dyn Threads) -> Vec<Blocker> {
-    let mut blockers = vec![Blocker::default(); model.triangles as usize];
+/// Lists the corners of all triangles, in memory that was used before.
+fn blockers(model: &Model, origin: DVec3, memory: Vec<Blocker>, threads: &dyn Threads) -> Vec<Blocker> {
+    let mut blockers = memory;
+    blockers.resize(model.triangles as usize, Blocker::default());
     for part in &model.parts {
         let count = part.mesh().triangles.len();
         let of_part = &mut blockers[part.first_triangle as usize..][..count];
@@ -408,10 +448,10 @@ fn draw(
     pass: &Pass<'_>,
     bins: &Bins,
     grid: &TileGrid,
+    tiles: &mut [[u32; TILE_PIXELS]],
     threads: &dyn Threads,
-) -> Vec<[u32; TILE_PIXELS]> {
-    let mut tiles = vec![[NO_TRIANGLE; TILE_PIXELS]; grid.count()];
-    for_each_mut(threads, &mut tiles, 4, &|index, tile| {
+) {
+    for_each_mut(threads, tiles, 4, &|index, tile| {
         let area = grid.area(index);
         let mut buffer = TileBuffer::new();
         buffer.draw(bins.solid(index), &area);
@@ -424,5 +464,4 @@ fn draw(
         *tile = buffer.id;
     });
     debug_assert!(pass.lens.rays == Rays::Parallel || pass.lens.near > 0.0);
-    tiles
 }

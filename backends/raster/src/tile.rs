@@ -24,6 +24,8 @@ pub(crate) struct TileGrid {
     height: u32,
     pub(crate) columns: u32,
     pub(crate) rows: u32,
+    /// Pixels around boxes that count as touched, too.
+    margin: i32,
 }
 
 /// The place of a tile in the picture.
@@ -60,7 +62,13 @@ pub(crate) trait Placed {
 
 impl TileGrid {
     pub(crate) fn new(width: u32, height: u32) -> Self {
-        Self { width, height, columns: width.div_ceil(TILE_WIDTH), rows: height.div_ceil(TILE_HEIGHT) }
+        let (columns, rows) = (width.div_ceil(TILE_WIDTH), height.div_ceil(TILE_HEIGHT));
+        Self { width, height, columns, rows, margin: 0 }
+    }
+
+    /// Returns the grid for triangles that are looked at from other places than the pixels' centers.
+    pub(crate) fn smooth(self, smooth: bool) -> Self {
+        Self { margin: i32::from(smooth), ..self }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -81,8 +89,9 @@ impl TileGrid {
     /// Calls `touch` for the tiles under a box.
     pub(crate) fn for_each_touched(&self, record: &impl Placed, mut touch: impl FnMut(usize)) {
         let ([x0, x1], [y0, y1]) = record.pixels();
-        let (x0, x1) = (x0.max(0), x1.min(self.width as i32 - 1));
-        let (y0, y1) = (y0.max(0), y1.min(self.height as i32 - 1));
+        let m = self.margin;
+        let (x0, x1) = ((x0 - m).max(0), (x1 + m).min(self.width as i32 - 1));
+        let (y0, y1) = ((y0 - m).max(0), (y1 + m).min(self.height as i32 - 1));
         if x0 > x1 || y0 > y1 {
             return;
         }
@@ -259,11 +268,17 @@ impl TileBuffer {
     #[inline(always)]
     pub(crate) fn draw_here<'r>(&mut self, records: impl Iterator<Item = &'r Record>, area: &TileArea) {
         for record in records {
-            let Some(pixels) = Pixels::of(record, area) else { continue };
-            match Blocks::new(record, area, &pixels) {
-                Some(blocks) => self.draw_blocks(record, area, &pixels, &blocks),
-                None => for_each_span(record, area, |span| self.draw_span(record, &span)),
-            }
+            self.draw_record(record, area);
+        }
+    }
+
+    /// Draws a solid triangle.
+    #[inline(always)]
+    pub(crate) fn draw_record(&mut self, record: &Record, area: &TileArea) {
+        let Some(pixels) = Pixels::of(record, area) else { return };
+        match Blocks::new(record, area, &pixels) {
+            Some(blocks) => self.draw_blocks(record, area, &pixels, &blocks),
+            None => for_each_span(record, area, |span| self.draw_span(record, &span)),
         }
     }
 

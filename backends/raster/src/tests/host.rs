@@ -190,3 +190,31 @@ fn an_eye_inside_of_things_and_empty_scenes_are_fine() {
     let empty = draw(&Scene::default(), camera([0.0; 3], [0.0, 0.0, -1.0]), 31, 31);
     assert!(empty.id().iter().all(|&id| id == 0) && empty.count_not_finite() == 0);
 }
+
+#[test]
+fn a_light_that_moves_has_its_map_redrawn_in_the_same_memory_and_others_are_kept() {
+    let mut scene = mixed();
+    scene.lights = vec![
+        Light::directional(DVec3::new(0.3, -1.0, 0.2)),
+        Light::directional(DVec3::new(-0.4, -1.0, 0.1)),
+        Light::point(DVec3::new(1.0, 3.0, 2.0), 4.0),
+    ];
+    let need = need_of(camera([2.0, 1.7, 4.0], [0.0; 3]), 61, 47);
+    let (mut raster, control) = (Raster::new(), Control::simple());
+    let mut prepare = |scene: &Scene| {
+        raster.prepare(&Arc::new(scene.clone()), &need, &Converter::default(), &control).unwrap();
+        let memory = raster.shadows().unwrap().memory();
+        let mut picture = Framebuffer::new(61, 47, need.channels);
+        raster.render(&need.frame(), &mut picture, &control).unwrap();
+        assert!(picture.same_bits(&draw(scene, need.camera.clone(), 61, 47)));
+        memory
+    };
+    let before = prepare(&scene);
+    scene.lights[1] = Light::directional(DVec3::new(-0.4, -1.0, -0.3));
+    let after = prepare(&scene);
+    assert_eq!(before.len(), 8, "two maps, and six faces of a cube");
+    assert_eq!(before, after);
+    // A light less: the last one's map is gone, those before it stay where they are.
+    scene.lights.pop();
+    assert_eq!(before[..1], prepare(&scene)[..1]);
+}

@@ -6,6 +6,7 @@ mod host;
 mod lines;
 mod pictures;
 mod shadows;
+mod smooth;
 
 use crate::Raster;
 use glam::{DVec3, Vec3};

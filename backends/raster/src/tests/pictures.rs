@@ -116,7 +116,7 @@ fn weights_agree_with_rays_to_a_thousandth_of_a_texel() {
     use crate::model::{Model, Source};
     let scene = textured_floor(Texture::from_srgb8("white", 1, 1, &[255; 4]));
     let mut model = Model::default();
-    assert!(model.add(&scene, 0, Source::Given(scene.objects[0].shape.clone())));
+    assert!(model.add(&scene, 0, Source::Given(scene.objects[0].shape.clone()), None));
     let camera = camera([0.0, 0.05, 4.0], [0.0, 0.0, -30.0]);
     let lens = Lens::of_camera(&camera, 640, 480, 1e-6).unwrap();
     let face = Face::new(&scene, &model, &lens, 0);

@@ -173,7 +173,7 @@ fn a_floor_under_everything_takes_no_texels() {
         let scene = scene_of(vec![(crumbs(9), [0.0, floor_at, 0.0]), (tetrahedron(), [0.0, 0.0, 0.0])]);
         let mut model = Model::default();
         for (i, object) in scene.objects.iter().enumerate() {
-            assert!(model.add(&scene, i, Source::Given(object.shape.clone())));
+            assert!(model.add(&scene, i, Source::Given(object.shape.clone()), None));
         }
         model
     };
