@@ -166,7 +166,8 @@ impl FrameDrawing<'_> {
 
     fn illumination(&self) -> Illumination<'_> {
         let wanted = self.channels.has(Channel::Color) || self.channels.has(Channel::Shadow);
-        Illumination { world: self.world, wanted }
+        let reads_color = self.channels.has(Channel::Color) || self.channels.has(Channel::Albedo);
+        Illumination { world: self.world, wanted, reads_color }
     }
 
     /// Gathers see-through surfaces and volumes in front of the opaque ones, layer by layer.

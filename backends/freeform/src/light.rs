@@ -31,6 +31,8 @@ pub(crate) struct Illumination<'a> {
     pub(crate) world: &'a World,
     /// Whether light is asked for at all.
     pub(crate) wanted: bool,
+    /// Whether the colors of surfaces are.
+    pub(crate) reads_color: bool,
 }
 
 impl Lit<'_> {
@@ -62,7 +64,7 @@ impl<'a> Illumination<'a> {
                 let body = hits.body.0[i];
                 if lit.points.material[i].is_none() {
                     let body_of = &self.world.bodies[body as usize];
-                    body_of.fill(scene, rays, hits, hits.of(body), &mut lit.points);
+                    body_of.fill(scene, rays, hits, hits.of(body), self.reads_color, &mut lit.points);
                 }
                 if let Some(m) = lit.points.material[i] {
                     lit.color.set(i, m.emission + ambient * lit.points.color.get(i) * m.ambient);

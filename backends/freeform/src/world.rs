@@ -189,7 +189,7 @@ impl Body {
         }
     }
 
-    /// Fills in the points that some of eight rays met on this body.
+    /// Fills in the points that some of eight rays met on this body; `reads_color` tells whether their color matters.
     #[inline(always)]
     pub(crate) fn fill<'a>(
         &'a self,
@@ -197,6 +197,7 @@ impl Body {
         rays: &Rays,
         hits: &Hits,
         met: Mask8,
+        reads_color: bool,
         points: &mut Points<'a>,
     ) {
         let position = rays.origin + rays.direction.scaled(hits.t);
@@ -213,7 +214,12 @@ impl Body {
             let local = self.object_from_world.transform_point3(position.get(i));
             let place = self.place(local, normal.get(i), material);
             let unit = place.normal.normalize_or_zero();
-            let (c, o) = scene.base_color(place.material, place.uv, local.as_vec3(), unit.as_vec3(), 0.0);
+            // Without anyone to see the color, only holes and haze are worth a look at the texture.
+            let (c, o) = if reads_color || self.see_through {
+                scene.base_color(place.material, place.uv, local.as_vec3(), unit.as_vec3(), 0.0)
+            } else {
+                (place.material.base_color, place.material.opacity)
+            };
             normal.set(i, place.normal);
             color.set(i, c);
             opacity.0[i] = place.material.effective_opacity(o);

@@ -83,18 +83,21 @@ pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
         });
     }
     bytes += of_blockers;
-    Plan { objects, passes, bytes, estimated_ms: milliseconds(scene, need, &demand, &amount) }
+    let estimated_ms = milliseconds(scene, need, &demand, &amount, options.samples);
+    Plan { objects, passes, bytes, estimated_ms }
 }
 
-fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, amount: &Amount) -> f64 {
+fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, amount: &Amount, samples: u32) -> f64 {
     use nanoseconds::{LIGHT, PIXEL, SHADOW, SURFACE, TEXEL, TRIANGLE, VERTEX};
     let seen = Survey::of(scene, need).seen;
     let texture = if demand.textures.is_some() { TEXEL } else { 0.0 };
     let lights = demand.shadows.len() as f64 * LIGHT + demand.shadow_count() as f64 * SHADOW;
     let shading = if demand.shading { texture + lights } else { 0.0 };
     let pixels = f64::from(need.width) * f64::from(need.height);
-    (amount.vertices * VERTEX + amount.triangles * TRIANGLE + pixels * (PIXEL + seen * (SURFACE + shading)))
-        * 1e-6
+    // Visibility is found at every sample, a triangle shaded once in a pixel.
+    let triangles = amount.triangles * TRIANGLE * f64::from(samples).sqrt();
+    let of_pixel = PIXEL * f64::from(samples) + seen * (SURFACE + shading);
+    (amount.vertices * VERTEX + triangles + pixels * of_pixel) * 1e-6
 }
 
 fn plan_object(

@@ -19,7 +19,7 @@ mod nanoseconds {
     /// A ray against a height field, for each doubling of its columns.
     pub(super) const HEIGHTS: f64 = 160.0;
     /// A sample of a volume, with what it takes to light it.
-    pub(super) const SAMPLE: f64 = 90.0;
+    pub(super) const SAMPLE: f64 = 75.0;
     /// A surface.
     pub(super) const SURFACE: f64 = 100.0;
     /// A light on it.

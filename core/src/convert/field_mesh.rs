@@ -106,9 +106,12 @@ pub(super) fn forecast(form: &FreeForm, tolerance: f64, finest: u32) -> (MeshSiz
             // Four times as many cells, and errors that fall as they fell, for each further halving.
             let falls = (worst / before).clamp(0.25, 0.5);
             let (mut bound, mut rest, mut times) = (worst * 1.5, most * 1.5, 1.0);
-            while bound > tolerance && !(rest <= tolerance && falls > 0.27) && resolution * 2 <= finest {
+            while resolution * 2 <= finest {
                 (bound, rest, times) = (bound * falls, rest * 0.25, times * 4.0);
                 resolution *= 2;
+                if bound <= tolerance || (rest <= tolerance && falls > 0.27) {
+                    break;
+                }
             }
             return (size_of_contour(&mesh, times), bound);
         }
@@ -126,7 +129,7 @@ fn size_of_contour(mesh: &Mesh, times: f64) -> MeshSize {
 /// and a vertex for every two triangles, with a color; at creases there are more.
 pub(super) fn forecast_of_volume(volume: &Volume) -> MeshSize {
     /// Vertices for each edge, from clouds to bones.
-    const VERTICES: f64 = 1.1;
+    const VERTICES: f64 = 1.2;
     let level = volume.transfer.surface_value();
     let [nx, ny, nz] = volume.size().map(|s| s as usize);
     let is_inside = |i: usize| volume.samples().get(i) >= level;

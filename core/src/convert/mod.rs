@@ -163,6 +163,12 @@ impl Detail {
 }
 
 impl Converter {
+    /// Counts the conversions at hand: meshes, voxels, grids of distances. What nobody asked for is none.
+    #[must_use]
+    pub fn kept(&self) -> [usize; 3] {
+        [self.meshes.count(), self.voxels.count(), self.distances.count()]
+    }
+
     /// Returns the shape of an object as triangles. Meshes are returned as they are.
     ///
     /// # Errors
@@ -395,6 +401,11 @@ impl<T> Default for Cache<T> {
 impl<T> Cache<T> {
     fn key(object: &Object, detail: Detail) -> Key {
         (Arc::as_ptr(&object.shape) as usize, detail.class(object), detail.max_resolution)
+    }
+
+    fn count(&self) -> usize {
+        let entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
+        entries.values().map(Vec::len).sum()
     }
 
     fn find(&self, scene: &Scene, object: &Object, detail: Detail) -> Option<Arc<T>> {

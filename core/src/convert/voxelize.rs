@@ -28,12 +28,12 @@ pub(super) fn chunks_of_form(form: &FreeForm, size: [u32; 3], cell: f64) -> u64 
     const CHUNK: u32 = crate::scene::CHUNK;
     let covered = DVec3::from_array(size.map(f64::from)) * cell;
     let first = form.bounds().center() - covered * 0.5;
-    // Eighths of a chunk: intervals are wide over much space.
-    let part = CHUNK / 8;
+    // In small parts: intervals are wide over much space.
+    let part = CHUNK / 16;
     let corner = |at: [u32; 3]| first + DVec3::from_array(at.map(f64::from)) * cell;
     let holds = |low: [u32; 3]| {
-        (0..512u32).any(|i| {
-            let from: [u32; 3] = std::array::from_fn(|a| low[a] + (i >> (3 * a) & 7) * part);
+        (0..4096u32).any(|i| {
+            let from: [u32; 3] = std::array::from_fn(|a| low[a] + (i >> (4 * a) & 15) * part);
             let to: [u32; 3] = std::array::from_fn(|a| (from[a] + part).min(size[a]));
             (0..3).all(|a| from[a] < size[a])
                 && form.form().interval(&Aabb::new(corner(from), corner(to))).hi >= 0.0
