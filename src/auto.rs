@@ -55,6 +55,20 @@ pub struct Choice {
     pub considered: Vec<Candidate>,
 }
 
+/// What a choice turned out to be at full size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// What was chosen, and from what.
+    #[serde(flatten)]
+    pub choice: Choice,
+    /// Median time of a frame in color, milliseconds.
+    pub ms: f64,
+    /// Color error.
+    pub error: f64,
+    /// Whether the goal was kept.
+    pub kept: bool,
+}
+
 /// Tolerances that are tried, in pixels.
 const TOLERANCES: [f64; 3] = [2.0, 0.5, 0.125];
 
@@ -120,15 +134,27 @@ pub fn choose(
                 drawn.push(pilot(studio, backend, scene, &need, size)?);
             }
             let mut predicted_ms = extrapolated(sizes, [drawn[0].ms, drawn[1].ms], need.width, need.height);
-            if predicted_ms < FULL_MS {
+            // Near a budget it matters on which side of it the time lies.
+            let is_close = matches!(goal, Goal::BudgetMs(ms) if (0.5..2.0).contains(&(predicted_ms / ms)));
+            if predicted_ms < FULL_MS || (is_close && predicted_ms < PATIENCE_MS) {
                 predicted_ms = pilot(studio, backend, scene, &need, [need.width, need.height])?.ms;
             }
             let error = |i: usize| color_rmse(&drawn[i].picture, &rulers[i].picture).unwrap_or(0.0);
+            let mut predicted_error = finer(error(0), error(1));
+            if plans.last().is_some_and(|p| p.objects.iter().any(|o| o.decision.bound() != Some(0.0))) {
+                // What is off by a share of a pixel is off by a smaller one of a pilot's: as coarse in its own pixels a
+                // pilot shows it at edges, of which a larger picture has fewer.
+                let share = f64::from(sizes[1][0]) / f64::from(need.width.max(1));
+                let coarse = Need { tolerance_px: tolerance_px / share, ..need.clone() };
+                let picture = pilot(studio, backend, scene, &coarse, sizes[1])?.picture;
+                let own = color_rmse(&picture, &rulers[1].picture).unwrap_or(0.0) * share.sqrt();
+                predicted_error = predicted_error.max(own);
+            }
             considered.push(Candidate {
                 backend: backend.clone(),
                 tolerance_px,
                 predicted_ms,
-                predicted_error: finer(error(0), error(1)),
+                predicted_error,
                 planned_bytes,
             });
             if drawn[1].prepare_ms + drawn[1].ms > PATIENCE_MS || backend == REFERENCE {
@@ -139,6 +165,33 @@ pub fn choose(
     let (chosen, meets_goal) = best(&considered, goal)
         .ok_or_else(|| StudioError::Threads("no back end that could be chosen can draw this".to_owned()))?;
     Ok(Choice { goal, chosen, meets_goal, considered })
+}
+
+/// Times what was chosen at full size; `error` is that of its picture.
+///
+/// # Errors
+/// When it cannot draw the scene after all.
+pub fn verify(
+    studio: &mut Studio,
+    scene: &Arc<Scene>,
+    need: &Need,
+    choice: Choice,
+    error: f64,
+) -> Result<Outcome, StudioError> {
+    let backend = choice.chosen.backend.clone();
+    let need = Need { tolerance_px: choice.chosen.tolerance_px, channels: Channels::COLOR, ..need.clone() };
+    let drawing = studio.draw(&backend, scene, &need)?;
+    let (mut picture, mut times) = (drawing.framebuffer, vec![drawing.frame_ms]);
+    while times.len() < 5 && times.iter().sum::<f64>() < PATIENCE_MS {
+        times.push(studio.render(&backend, &need.frame(), &mut picture)?.1);
+    }
+    times.sort_unstable_by(f64::total_cmp);
+    let ms = times[(times.len() - 1) / 2];
+    let kept = match choice.goal {
+        Goal::MaxError(most) => error <= most,
+        Goal::BudgetMs(most) => ms <= most,
+    };
+    Ok(Outcome { choice, ms, error, kept })
 }
 
 struct Pilot {

@@ -43,6 +43,8 @@ pub struct Comparison {
     pub threads: usize,
     /// The reference first, then the others.
     pub panels: Vec<Panel>,
+    /// What was chosen automatically, and what it turned out to be; nothing when nobody asked for a choice.
+    pub choice: Option<crate::auto::Outcome>,
     /// Back ends in libraries that failed, and why: they have no panel, and the others are untouched.
     pub failures: Vec<(String, StudioError)>,
 }
@@ -138,6 +140,7 @@ pub fn compare(
         height: request.need.height,
         threads: work.studio.pool().count(),
         panels,
+        choice: None,
         failures,
     })
 }

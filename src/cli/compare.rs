@@ -3,6 +3,7 @@
 use super::arguments::CompareArguments;
 use super::{Failure, auto, input, print};
 use indicatif::{ProgressBar, ProgressStyle};
+use polyptych::auto::verify;
 use polyptych::compare::{Request, compare};
 use polyptych::report;
 use std::path::PathBuf;
@@ -33,31 +34,40 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
         ProgressStyle::with_template("{spinner} {pos}/{len} {msg}").unwrap_or(ProgressStyle::default_bar()),
     );
     bar.enable_steady_tick(Duration::from_millis(100));
-    let comparison = compare(&mut studio, &scene, &request, &mut |step| {
+    let mut comparison = compare(&mut studio, &scene, &request, &mut |step| {
         bar.set_message(step.to_owned());
         bar.inc(1);
     })
     .map_err(Failure::running)?;
+    if let (Some(choice), Some(panel)) = (choice, comparison.panels.last()) {
+        bar.set_message("holding what was chosen against what was expected");
+        // The reference itself has no error.
+        let error = panel.errors.and_then(|e| e.color).map_or(0.0, |c| c.rmse);
+        let outcome = verify(&mut studio, &scene, &request.need, choice, error).map_err(Failure::running)?;
+        comparison.choice = Some(outcome);
+    }
     bar.finish_and_clear();
 
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from("out/compare"));
     let command = std::env::args().collect::<Vec<_>>().join(" ");
     report::write(&comparison, &folder, &command).map_err(Failure::running)?;
     if arguments.draw.json {
-        let mut numbers = report::numbers(&comparison);
-        numbers["auto"] = serde_json::json!(choice);
-        print(&format!("{numbers}\n"));
+        print(&format!("{}\n", report::numbers(&comparison)));
     } else if !arguments.draw.quiet {
         print(&format!("{}\n", report::table(&comparison)));
         print(&format!("wrote {0}/index.html, {0}/sheet.png, {0}/compare.json\n", folder.display()));
     }
-    if let Some(choice) = choice.filter(|_| !arguments.draw.quiet)
-        && let Some(panel) = comparison.panels.last()
-    {
-        let error = panel.errors.and_then(|e| e.color).map_or(0.0, |c| c.rmse);
+    if let Some(outcome) = comparison.choice.as_ref().filter(|_| !arguments.draw.quiet) {
+        let chosen = &outcome.choice.chosen;
         eprintln!(
-            "auto: {} took {:.1} ms where {:.1} were expected, with an error of {error:.4} where {:.4} was expected",
-            panel.backend, panel.frame_ms, choice.chosen.predicted_ms, choice.chosen.predicted_error
+            "auto: {} took {:.1} ms where {:.1} were expected, with an error of {:.4} where {:.4} was expected: the goal \
+             is {}",
+            chosen.backend,
+            outcome.ms,
+            chosen.predicted_ms,
+            outcome.error,
+            chosen.predicted_error,
+            if outcome.kept { "kept" } else { "missed" }
         );
     }
     if arguments.draw.verbose {

@@ -50,6 +50,7 @@ pub fn numbers(comparison: &Comparison) -> Value {
         "notes": comparison.notes,
         "reference": reference.first().map(|p| panel_json(comparison, p)),
         "panels": others.iter().map(|p| panel_json(comparison, p)).collect::<Vec<_>>(),
+        "auto": comparison.choice,
     })
 }
 
