@@ -58,6 +58,12 @@ impl Pane {
         self.shown.as_ref()
     }
 
+    /// Tells whether the full picture of what was ordered last is shown, or why there is none.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        let full = self.shown.as_ref().is_some_and(|p| p.is_full && p.backend == self.backend);
+        !self.painter.is_busy() && (full || self.failure.is_some())
+    }
+
     /// Draws the picture into a rectangle, or the part of it inside `clip`.
     pub(crate) fn draw(&self, painter: &egui::Painter, rect: Rect, clip: Rect) {
         let painter = painter.with_clip_rect(clip.intersect(painter.clip_rect()));
@@ -89,7 +95,7 @@ impl Pane {
         shows_error: bool,
     ) -> bool {
         let before = (self.backend.clone(), self.channel);
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             let chosen = egui::ComboBox::from_id_salt(("back end", number))
                 .selected_text(&self.backend)
                 .show_ui(ui, |ui| {

@@ -52,6 +52,8 @@ pub struct Viewer {
     pub(crate) difference: Comparer,
     /// The reference that all panes are held against, while that is wanted.
     pub(crate) truth: Option<Pane>,
+    /// Whether the reference's picture is still to be ordered: it waits until the panes are done.
+    truth_waits: bool,
     /// Whether pictures are shown whose comparison is not done yet.
     compares_still: bool,
 }
@@ -86,6 +88,7 @@ impl Viewer {
             pointed: None,
             difference: Comparer::default(),
             truth: None,
+            truth_waits: false,
             compares_still: false,
         })
     }
@@ -129,10 +132,8 @@ impl Viewer {
     pub fn is_at_rest(&self) -> bool {
         self.loading.is_none()
             && !self.compares_still
-            && self.panes.iter().chain(&self.truth).all(|pane| {
-                let full = pane.painting().is_some_and(|p| p.is_full && p.backend == pane.backend);
-                !pane.painter.is_busy() && (full || pane.failure.is_some())
-            })
+            && !self.truth_waits
+            && self.panes.iter().chain(&self.truth).all(Pane::is_at_rest)
     }
 
     /// Returns the map of what differs between the first two panes, row by row, in the mode that shows it.
@@ -188,7 +189,14 @@ impl Viewer {
             (truth.size, truth.channel) = (pane.size, pane.channel);
         }
         if changed {
-            self.order_all();
+            self.panes.iter().for_each(|pane| self.order(pane));
+            self.truth_waits = self.truth.is_some();
+        }
+        if let Some(truth) = self.truth.as_ref().filter(|_| self.truth_waits)
+            && self.panes.iter().all(Pane::is_at_rest)
+        {
+            self.order(truth);
+            self.truth_waits = false;
         }
         self.compare(&ctx);
     }
@@ -204,7 +212,7 @@ impl Viewer {
         {
             self.compares_still |= !self.difference.compare([&a, &b], first.channel, ctx);
         }
-        let Some(truth) = self.truth.as_ref().and_then(full) else { return };
+        let Some(truth) = self.truth.as_ref().filter(|_| !self.truth_waits).and_then(full) else { return };
         for pane in &mut self.panes {
             if let Some(picture) = full(pane) {
                 self.compares_still |= !pane.error.compare([&picture, &truth], Channel::Color, ctx);
@@ -259,11 +267,6 @@ impl Viewer {
             self.panes.push(Pane::new(backend, Channel::Color, painter));
         }
         self.active = self.active.min(count - 1);
-    }
-
-    /// Orders the pictures of all panes anew.
-    fn order_all(&self) {
-        self.panes.iter().chain(&self.truth).for_each(|pane| self.order(pane));
     }
 
     fn order(&self, pane: &Pane) {
