@@ -23,6 +23,7 @@ pub mod chart;
 pub mod compare;
 pub mod conformance;
 pub mod export;
+pub mod pace;
 pub mod picture;
 pub mod plugins;
 pub mod report;

@@ -53,12 +53,19 @@ impl Studio {
     /// # Errors
     /// When the threads cannot be started.
     pub fn new(registry: Registry, threads: usize) -> Result<Self, StudioError> {
-        Ok(Self {
-            registry,
-            pool: Pool::new(threads).map_err(StudioError::Threads)?,
-            converter: Converter::default(),
-            renderers: BTreeMap::new(),
-        })
+        Ok(Self::with_pool(registry, Pool::new(threads).map_err(StudioError::Threads)?))
+    }
+
+    /// Opens a studio whose threads stay each on a core of its own where that is possible, for measuring.
+    ///
+    /// # Errors
+    /// When the threads cannot be started.
+    pub fn pinned(registry: Registry, threads: usize) -> Result<Self, StudioError> {
+        Ok(Self::with_pool(registry, Pool::pinned(threads).map_err(StudioError::Threads)?))
+    }
+
+    fn with_pool(registry: Registry, pool: Pool) -> Self {
+        Self { registry, pool, converter: Converter::default(), renderers: BTreeMap::new() }
     }
 
     /// Returns the back ends.

@@ -137,28 +137,21 @@ fn plans_build_nothing_and_name_what_is_built() {
 
 #[test]
 fn planned_bytes_are_those_that_are_held() {
-    // Left out are converted free forms, whose meshes nobody can foresee without making them.
-    let cases = [
-        ("raster", "polyhedra"),
-        ("raster", "figure"),
-        ("raster", "terrain"),
-        ("voxel", "atelier"),
-        ("voxel", "polyhedra"),
-        ("voxel", "figure"),
-        ("voxel", "terrain"),
-        ("voxel", "cloud"),
-        ("freeform", "terrain"),
-        ("freeform", "cloud"),
-    ];
+    // Surfaces that must be found before they can be counted: how many chunks a form fills, and how often vertices of a
+    // cloud's surface are split at creases.
+    let unknown = [("voxel", "quadrics"), ("raster", "cloud"), ("stylized", "cloud")];
     let mut off = Vec::new();
-    for (backend, name) in cases {
-        let scene = builtin(name);
-        let mut studio = studio(2);
-        let need = Need { width: 480, height: 270, ..need(&scene, Channels::COLOR) };
-        let planned = studio.renderer(backend).unwrap().plan(&scene, &need).bytes as f64;
-        let held = studio.prepare(backend, &scene, &need).unwrap().0.bytes as f64;
-        if !(0.9..=1.1).contains(&(planned / held)) {
-            off.push(format!("{backend}, {name}: {planned} planned, {held} held"));
+    for backend in BACKENDS {
+        for name in polyptych::builtin::NAMES {
+            let scene = builtin(name);
+            let mut studio = studio(2);
+            let need = Need { width: 480, height: 270, ..need(&scene, Channels::COLOR) };
+            let planned = studio.renderer(backend).unwrap().plan(&scene, &need).bytes as f64;
+            let held = studio.prepare(backend, &scene, &need).unwrap().0.bytes as f64;
+            let slack = if unknown.contains(&(backend, name)) { 0.6 } else { 0.1 };
+            if (planned / held - 1.0).abs() > slack {
+                off.push(format!("{backend}, {name}: {planned} planned, {held} held"));
+            }
         }
     }
     assert!(off.is_empty(), "{}", off.join("\n"));
@@ -171,4 +164,87 @@ fn no_shadow_map_is_planned_or_held_where_nothing_blocks_light() {
     let need = need(&scene, Channels::COLOR);
     assert!(!pass(&studio.renderer("raster").unwrap().plan(&scene, &need), "shadow map"));
     assert!(studio.prepare("raster", &scene, &need).unwrap().0.bytes < 1 << 24);
+}
+
+/// A ball in the sun, another one somewhere.
+fn two_balls(other: DVec3) -> Arc<Scene> {
+    let mut scene = Scene::default();
+    let stone = scene.add_material(Material::new(Vec3::new(0.7, 0.6, 0.5)));
+    for (name, place) in [("ball", DVec3::ZERO), ("other", other)] {
+        let body = Shape::Primitive(polyptych::scene::Primitive::Sphere { radius: 1.0 });
+        scene.objects.push(Object::new(name, body, stone).at(place));
+    }
+    scene.lights.push(Light::directional(DVec3::NEG_Y));
+    let view = Projection::Perspective { fov_y: 1.2 };
+    scene.cameras.push(("front".to_owned(), Camera::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, view)));
+    Arc::new(scene)
+}
+
+#[test]
+fn no_shadow_is_looked_for_where_no_body_stands_before_another() {
+    let (beside, above) = (two_balls(DVec3::X * 4.0), two_balls(DVec3::Y * 2.5));
+    for backend in ["raster", "freeform"] {
+        let mut studio = studio(2);
+        let mut draw = |scene: &Arc<Scene>| {
+            let is_planned =
+                pass(&studio.renderer(backend).unwrap().plan(scene, &need(scene, Channels::COLOR)), "shadow");
+            (studio.draw(backend, scene, &need(scene, Channels::ALL)).unwrap(), is_planned)
+        };
+        let mut lit = (*beside).clone();
+        lit.lights[0].casts_shadow = false;
+        let ((saved, is_planned), (without, _)) = (draw(&beside), draw(&Arc::new(lit)));
+        assert!(!is_planned, "{backend}");
+        assert_eq!(saved.framebuffer.color(), without.framebuffer.color(), "{backend}");
+        assert_eq!(saved.prepared.bytes, without.prepared.bytes, "{backend}");
+        let rays = |d: &polyptych::Drawing| {
+            d.report.counters.iter().flatten().find(|c| c.name == "rays").map(|c| c.count)
+        };
+        assert_eq!(rays(&saved), rays(&without), "{backend}");
+        // And where one does, there is a shadow, as the reference sees it.
+        let (shaded, is_planned) = draw(&above);
+        assert!(is_planned, "{backend}");
+        let reference =
+            common::studio(2).draw("reference", &above, &need(&above, Channels::ALL)).unwrap().framebuffer;
+        let errors = polyptych::metrics::Errors::of_geometry(&shaded.framebuffer, &reference);
+        assert!(errors.shadow_agreement > Some(0.99), "{backend}: {errors:?}");
+    }
+}
+
+#[test]
+fn the_converter_is_asked_for_what_cannot_be_drawn_as_given_and_no_more() {
+    let none = [0, 0, 0];
+    // What is native to a back end is never converted.
+    let native = [
+        ("reference", "atelier"),
+        ("voxel", "figure"),
+        ("freeform", "quadrics"),
+        ("freeform", "terrain"),
+        ("freeform", "cloud"),
+        ("freeform", "polyhedra"),
+    ];
+    for (backend, name) in native {
+        let scene = builtin(name);
+        let mut studio = studio(2);
+        studio.prepare(backend, &scene, &need(&scene, Channels::ALL)).unwrap();
+        assert_eq!(studio.converter().kept(), none, "{backend}, {name}");
+    }
+    let scene = builtin("atelier");
+    let mut studio = studio(2);
+    let need = need(&scene, Channels::COLOR);
+    for backend in BACKENDS {
+        studio.renderer(backend).unwrap().plan(&scene, &need);
+    }
+    assert_eq!(studio.converter().kept(), none, "plans build nothing");
+    studio.prepare("raster", &scene, &need).unwrap();
+    let of_raster = studio.converter().kept();
+    let shapes: std::collections::HashSet<_> = scene.objects.iter().map(|o| Arc::as_ptr(&o.shape)).collect();
+    assert!(of_raster[0] <= shapes.len() && of_raster[1..] == [0, 0], "{of_raster:?}");
+    // The stylized shader sees through the rasterizer: what that converted serves it, too. So it does a moved camera.
+    studio.prepare("stylized", &scene, &need).unwrap();
+    let mut moved = need.clone();
+    moved.camera.eye += need.camera.right() * 1e-3;
+    studio.prepare("raster", &scene, &moved).unwrap();
+    assert_eq!(studio.converter().kept(), of_raster);
+    studio.prepare("voxel", &scene, &need).unwrap();
+    assert!(studio.converter().kept()[1] > 0 && studio.converter().kept()[2] == 0);
 }

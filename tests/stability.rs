@@ -13,7 +13,20 @@ fn stability(arguments: &[&str], out: &std::path::Path) -> Output {
 fn nothing_breaks_earlier_than_written_and_what_does_is_told() {
     let out = std::env::temp_dir().join(format!("polyptych-stability-{}", std::process::id()));
     let limits = concat!(env!("CARGO_MANIFEST_DIR"), "/LIMITS.md");
-    let cases = ["degenerate", "shared-edges", "coplanar", "depth-resolution", "huge-triangles"];
+    let cases = [
+        "degenerate",
+        "shared-edges",
+        "slivers",
+        "coplanar",
+        "depth-resolution",
+        "huge-triangles",
+        "far-voxels",
+        "huge-scenes",
+        "voxel-edges",
+        "voxel-corners",
+        "edits",
+        "missing-lines",
+    ];
     let done = stability(&[&cases[..], &["--check", limits]].concat(), &out);
     let told = String::from_utf8_lossy(&done.stderr);
     assert_eq!(done.status.code(), Some(0), "{told}");

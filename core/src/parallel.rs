@@ -32,6 +32,7 @@ impl Threads for OneThread {
 #[derive(Clone)]
 pub struct Pool {
     pool: Arc<rayon::ThreadPool>,
+    is_pinned: bool,
 }
 
 impl Pool {
@@ -40,18 +41,77 @@ impl Pool {
     /// # Errors
     /// When the system refuses to start that many threads; the message says why.
     pub fn new(count: usize) -> Result<Self, String> {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(count)
-            .thread_name(|i| format!("polyptych-{i}"))
+        Self::build(count, &[])
+    }
+
+    /// Starts a pool whose threads stay each on a core of its own, so that times can be compared. Where that is not
+    /// possible (more threads than cores, or a system without such a call) it is a plain one; see [`Pool::is_pinned`].
+    ///
+    /// # Errors
+    /// When the system refuses to start that many threads; the message says why.
+    pub fn pinned(count: usize) -> Result<Self, String> {
+        let cores = cores::allowed();
+        let wanted = if count == 0 { cores.len() } else { count };
+        Self::build(count, if wanted <= cores.len() { &cores[..wanted] } else { &[] })
+    }
+
+    /// Tells whether every thread stays on a core of its own.
+    #[must_use]
+    pub fn is_pinned(&self) -> bool {
+        self.is_pinned
+    }
+
+    fn build(count: usize, cores: &[usize]) -> Result<Self, String> {
+        let builder =
+            rayon::ThreadPoolBuilder::new().num_threads(count).thread_name(|i| format!("polyptych-{i}"));
+        let own = cores.to_vec();
+        let pool = builder
+            .start_handler(move |i| {
+                if let Some(&core) = own.get(i) {
+                    cores::stay_on(core);
+                }
+            })
             .build()
-            .map(|pool| Self { pool: Arc::new(pool) })
-            .map_err(|e| format!("cannot start {count} threads: {e}"))
+            .map_err(|e| format!("cannot start {count} threads: {e}"))?;
+        // Asked of the threads themselves: a system may refuse one of them.
+        let pinned =
+            pool.broadcast(|thread| cores.get(thread.index()).is_some_and(|&c| cores::allowed() == [c]));
+        Ok(Self { is_pinned: pinned.iter().all(|&p| p), pool: Arc::new(pool) })
     }
 
     /// Runs `work` inside the pool, so that rayon's own parallel iterators use these threads too.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         self.pool.install(work)
     }
+}
+
+/// The cores of the machine, where the system lets a thread choose.
+#[cfg(target_os = "linux")]
+mod cores {
+    use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+
+    /// Lists the cores that the calling thread may run on.
+    pub(super) fn allowed() -> Vec<usize> {
+        sched_getaffinity(None)
+            .map_or(Vec::new(), |set| (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core)).collect())
+    }
+
+    /// Keeps the calling thread on one core. A system that refuses leaves it as it was.
+    pub(super) fn stay_on(core: usize) {
+        let mut set = CpuSet::new();
+        set.set(core);
+        let _ = sched_setaffinity(None, &set);
+    }
+}
+
+/// Elsewhere threads go where the system puts them.
+#[cfg(not(target_os = "linux"))]
+mod cores {
+    pub(super) fn allowed() -> Vec<usize> {
+        Vec::new()
+    }
+
+    pub(super) fn stay_on(_core: usize) {}
 }
 
 impl Threads for Pool {
@@ -115,6 +175,17 @@ pub fn for_each_index(threads: &dyn Threads, count: usize, grain: usize, work: &
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pinned_threads_stay_and_more_than_there_are_cores_do_not() {
+        let cores = cores::allowed().len();
+        if cores > 0 {
+            assert!(Pool::pinned(1).unwrap().is_pinned() && Pool::pinned(0).unwrap().is_pinned());
+        }
+        let many = Pool::pinned(cores + 1).unwrap();
+        assert_eq!((many.is_pinned(), many.count()), (false, cores + 1));
+        assert!(!Pool::new(1).unwrap().is_pinned());
+    }
 
     #[test]
     fn every_item_is_visited_once_with_its_index() {

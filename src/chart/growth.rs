@@ -129,7 +129,7 @@ impl Run {
             };
             let mut own;
             let studio = if self.quantity == Quantity::Threads {
-                own = Studio::new(studio.registry().clone(), count as usize)?;
+                own = Studio::pinned(studio.registry().clone(), count as usize)?;
                 &mut own
             } else {
                 &mut *studio

@@ -12,6 +12,7 @@ mod sweep;
 
 pub use axes::{QualityAxis, quality_axes};
 pub use front::{best_within, fastest_under, front};
+pub(crate) use growth::ball;
 pub use growth::{Growth, Quantity};
 pub use sweep::AxisWalk;
 
@@ -213,6 +214,8 @@ pub struct Chart {
     pub height: u32,
     /// Threads that were used.
     pub threads: usize,
+    /// Whether each of them stayed on a core of its own.
+    pub pinned: bool,
     /// Samples a pixel of the antialiased ruler.
     pub ruler_samples: u32,
     /// The ruler's picture of each scene at the pixels' centers, as JPEG.
@@ -256,6 +259,7 @@ pub fn chart(
         width: request.width,
         height: request.height,
         threads: crate::parallel::Threads::count(studio.pool()),
+        pinned: studio.pool().is_pinned(),
         ruler_samples: request.ruler_samples,
         rulers: Vec::new(),
         points: Vec::new(),

@@ -15,7 +15,7 @@ const UNFINISHED: &str = "unfinished.jsonl";
 
 pub(super) fn run(arguments: &ChartArguments) -> Result<(), Failure> {
     let mut studio =
-        input::studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
+        input::measuring_studio(usize::from(arguments.draw.threads.unwrap_or(0)), &arguments.draw.plugins)?;
     let default = ["reference", "raster", "voxel", "freeform", "stylized"];
     let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
     let [width, height] = arguments.draw.size.unwrap_or([256, 144]);

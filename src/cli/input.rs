@@ -43,11 +43,20 @@ pub(super) fn named_scene(name: &str, reading: &ReadingArguments) -> Result<Arc<
 /// Opens a studio with the threads that were asked for, the built-in back ends and the plugins. What is refused is
 /// told on standard error.
 pub(super) fn studio(threads: usize, arguments: &PluginArguments) -> Result<Studio, Failure> {
+    Studio::new(warned_registry(arguments)?, threads).map_err(Failure::running)
+}
+
+/// Opens a studio for measuring: its threads stay on cores of their own where that is possible.
+pub(super) fn measuring_studio(threads: usize, arguments: &PluginArguments) -> Result<Studio, Failure> {
+    Studio::pinned(warned_registry(arguments)?, threads).map_err(Failure::running)
+}
+
+fn warned_registry(arguments: &PluginArguments) -> Result<Registry, Failure> {
     let (registry, refused) = registry(arguments)?;
     for refusal in refused {
         eprintln!("warning: plugin refused: {refusal}");
     }
-    Studio::new(registry, threads).map_err(Failure::running)
+    Ok(registry)
 }
 
 /// Returns the built-in back ends and the plugins, and what was refused.

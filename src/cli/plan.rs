@@ -2,6 +2,7 @@
 
 use super::arguments::PlanArguments;
 use super::{Failure, input, print};
+use polyptych::pace::Pace;
 use polyptych::seam::{Need, Plan};
 use serde_json::{Value, json};
 
@@ -12,10 +13,13 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let backends = input::backends(&arguments.draw, studio.registry(), &default)?;
     let mut settings = input::settings(&arguments.draw, studio.registry(), &backends)?;
     let base = input::need(&arguments.draw, &scene)?;
+    // Times are those of this machine; how fast it is was measured before, or is now, once.
+    let pace = Pace::of_this_machine(studio.registry()).map_err(Failure::running)?;
     let mut all = Vec::new();
     for backend in &backends {
         let need = Need { settings: settings.remove(backend).unwrap_or_default(), ..base.clone() };
-        let plan = studio.renderer(backend).map_err(Failure::running)?.plan(&scene, &need);
+        let mut plan = studio.renderer(backend).map_err(Failure::running)?.plan(&scene, &need);
+        plan.estimated_ms *= pace.factor(backend);
         if arguments.draw.json {
             all.push(plan_json(backend, &plan));
         } else {
@@ -42,7 +46,8 @@ fn plan_json(backend: &str, plan: &Plan) -> Value {
 }
 
 fn text(backend: &str, plan: &Plan) -> String {
-    let mut text = format!("{backend}: {} bytes, about {:.1} ms a frame\n", plan.bytes, plan.estimated_ms);
+    let mut text =
+        format!("{backend}: {} bytes, about {:.1} ms a frame on one thread\n", plan.bytes, plan.estimated_ms);
     for object in &plan.objects {
         let bound = match object.decision.bound() {
             Some(bound) if bound > 0.0 => format!(", at most {bound:.2e} m off"),

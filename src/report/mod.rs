@@ -6,6 +6,8 @@ pub(crate) mod plot;
 mod sheet;
 pub mod stability;
 
+pub(crate) use page::machine;
+
 use crate::compare::{Comparison, Panel};
 use crate::framebuffer::Channel;
 use crate::picture::{self, PictureError, write_whole};

@@ -58,7 +58,7 @@ fn panel(comparison: &Comparison, panel: &Panel) -> Value {
 }
 
 /// Names the processor.
-pub(super) fn machine() -> String {
+pub(crate) fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = info

@@ -15,7 +15,7 @@ use crate::framebuffer::{Channel, Framebuffer};
 use crate::picture::{displayed, encode};
 use crate::seam::{Need, Settings};
 use crate::studio::{Studio, StudioError};
-use count::{Count, Drawn};
+use count::{Count, Drawn, Trial};
 use scenes::Setup;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -77,6 +77,8 @@ pub struct Outcome {
     pub passed: bool,
     /// What went wrong besides: a panic, a refusal.
     pub failure: Option<String>,
+    /// Whether values were left out because they would take too long.
+    pub is_cut_short: bool,
     /// Pictures before and at the break (or at the last value), and the reference's at it, as JPEG.
     #[serde(skip)]
     pub pictures: Vec<(f64, Vec<u8>)>,
@@ -88,6 +90,8 @@ pub struct Probe {
     pub error: f64,
     /// Time of a frame, milliseconds.
     pub ms: f64,
+    /// Time to prepare, milliseconds, where it counts.
+    pub prepare_ms: f64,
     /// The back end's picture, where a single one is compared.
     pub picture: Option<Framebuffer>,
     /// The reference's.
@@ -133,12 +137,16 @@ impl Case {
             change(&mut own);
         }
         // A panic is a finding here, and the other cases go on: the studio makes the renderer anew.
-        let result = catch_unwind(AssertUnwindSafe(|| {
-            let first = || (self.build)(self.values[0]);
-            self.count.count(studio, backend, &own, &plain, &first, self.is_method)
-        }));
+        let first = || (self.build)(self.values[0]);
+        let index = self.values.iter().position(|v| *v == value).unwrap_or(0);
+        let before = || (self.build)(self.values[index - 1]);
+        let before: Option<&dyn Fn() -> Setup> = if index > 0 { Some(&before) } else { None };
+        let trial = Trial { backend, own, plain, first: &first, before, is_method: self.is_method };
+        let result = catch_unwind(AssertUnwindSafe(|| self.count.count(studio, &trial)));
         match result {
-            Ok(Ok(Drawn { error, ms, picture, reference })) => Ok(Probe { error, ms, picture, reference }),
+            Ok(Ok(Drawn { error, ms, prepare_ms, picture, reference })) => {
+                Ok(Probe { error, ms, prepare_ms, picture, reference })
+            }
             Ok(Err(error)) => Err(error.to_string()),
             Err(_) => Err("it panicked".to_owned()),
         }
@@ -159,20 +167,25 @@ impl Case {
             limit: self.limit,
             passed: true,
             failure: None,
+            is_cut_short: false,
             pictures: Vec::new(),
         };
         let mut last: Option<(f64, Probe)> = None;
-        for &value in &self.values {
+        for (index, &value) in self.values.iter().enumerate() {
             let probe = match self.probe(studio, backend, value, is_better) {
                 Ok(probe) => probe,
                 Err(failure) => {
                     outcome.failure = Some(failure);
-                    Probe { error: f64::INFINITY, ms: 0.0, picture: None, reference: None }
+                    Probe { error: f64::INFINITY, ms: 0.0, prepare_ms: 0.0, picture: None, reference: None }
                 }
             };
             outcome.values.push(value);
             outcome.error.push(probe.error);
             outcome.ms.push(probe.ms);
+            let next = self.values.get(index + 1).map_or(1.0, |next| next / value.max(1.0));
+            outcome.is_cut_short = self.count == Count::Growth
+                && next > 1.0
+                && (probe.ms + probe.prepare_ms) * next > PATIENCE_MS;
             let is_broken = probe.error.is_nan() || probe.error > self.limit;
             if outcome.breaks_at.is_some() {
                 break;
@@ -187,6 +200,9 @@ impl Case {
                 }
             } else {
                 last = Some((value, probe));
+            }
+            if outcome.is_cut_short {
+                break;
             }
         }
         if outcome.pictures.is_empty() {
@@ -239,8 +255,20 @@ pub fn stability(
     outcomes
 }
 
-/// Draws a setup with a back end and all channels that are compared.
+/// A load is not raised any further where the next would take longer than this, milliseconds.
+const PATIENCE_MS: f64 = 4000.0;
+
+/// Draws a setup with a back end and all channels that are compared. Returns the picture and the frame's milliseconds.
 fn draw(studio: &mut Studio, backend: &str, setup: &Setup) -> Result<(Framebuffer, f64), StudioError> {
+    draw_measured(studio, backend, setup).map(|(picture, ms, ..)| (picture, ms))
+}
+
+/// The same with the milliseconds to prepare and the bytes held.
+fn draw_measured(
+    studio: &mut Studio,
+    backend: &str,
+    setup: &Setup,
+) -> Result<(Framebuffer, f64, f64, u64), StudioError> {
     let mut need: Need = setup.need.clone();
     need.settings = Settings::default();
     let info = studio.registry().info(backend)?.clone();
@@ -251,7 +279,7 @@ fn draw(studio: &mut Studio, backend: &str, setup: &Setup) -> Result<(Framebuffe
     let k = if backend == REFERENCE { 1 } else { setup.supersampling };
     (need.width, need.height) = (need.width * k, need.height * k);
     let drawing = studio.draw(backend, &setup.scene, &need)?;
-    Ok((drawing.framebuffer, drawing.frame_ms))
+    Ok((drawing.framebuffer, drawing.frame_ms, drawing.prepare_ms, drawing.prepared.bytes))
 }
 
 #[cfg(test)]

@@ -16,7 +16,11 @@ pub(super) struct Setup {
     pub(super) scene: Arc<Scene>,
     pub(super) need: Need,
     /// Settings of the back ends that have them.
-    pub(super) settings: Vec<(&'static str, &'static str)>,
+    pub(super) settings: Vec<(&'static str, String)>,
+    /// Settings of what pictures are held against.
+    pub(super) ruler_settings: Vec<(&'static str, String)>,
+    /// Scenes that came before: what is kept of them must not show. Of a case about lines, the scene that has them.
+    pub(super) history: Vec<Arc<Scene>>,
     /// Samples along each edge of a pixel that the host takes.
     pub(super) supersampling: u32,
     /// Step of a moving camera in pixels, and the distance of what it looks at.
@@ -28,17 +32,25 @@ pub(super) struct Setup {
     pub(super) load: f64,
 }
 
-const WIDTH: u32 = 96;
-const HEIGHT: u32 = 72;
+pub(super) const WIDTH: u32 = 96;
+pub(super) const HEIGHT: u32 = 72;
 
-fn setup(scene: Scene, camera: Camera) -> Setup {
-    let channels =
-        Channels::of(&[Channel::Color, Channel::Distance, Channel::Normal, Channel::Id, Channel::Shadow]);
+pub(super) fn setup(scene: Scene, camera: Camera) -> Setup {
+    let channels = Channels::of(&[
+        Channel::Color,
+        Channel::Distance,
+        Channel::Normal,
+        Channel::Id,
+        Channel::Albedo,
+        Channel::Shadow,
+    ]);
     let distance = camera.eye.distance(scene.bounds().center());
     Setup {
         scene: Arc::new(scene),
         need: Need { channels, ..Need::new(camera, WIDTH, HEIGHT) },
         settings: Vec::new(),
+        ruler_settings: Vec::new(),
+        history: Vec::new(),
         supersampling: 1,
         step_px: 1.0 / 16.0,
         distance,
@@ -47,16 +59,16 @@ fn setup(scene: Scene, camera: Camera) -> Setup {
     }
 }
 
-fn perspective(fov_y: f64) -> Projection {
+pub(super) fn perspective(fov_y: f64) -> Projection {
     Projection::Perspective { fov_y }
 }
 
-fn look(eye: DVec3, target: DVec3, fov_y: f64) -> Camera {
+pub(super) fn look(eye: DVec3, target: DVec3, fov_y: f64) -> Camera {
     Camera::look_at(eye, target, DVec3::Y, perspective(fov_y))
 }
 
 /// Begins a scene with a light and two materials: 0 light, 1 dark.
-fn studio() -> Scene {
+pub(super) fn studio() -> Scene {
     let mut scene = Scene::default();
     scene.add_material(Material::new(Vec3::new(0.85, 0.75, 0.6)));
     scene.add_material(Material::new(Vec3::new(0.2, 0.35, 0.6)));
@@ -80,7 +92,7 @@ fn placed(mut scene: Scene, world_from_scene: DAffine3) -> Scene {
     scene
 }
 
-fn front(scene: &Scene) -> Camera {
+pub(super) fn front(scene: &Scene) -> Camera {
     Camera::framing(&scene.bounds(), 0.5, 0.35, f64::from(WIDTH) / f64::from(HEIGHT), perspective(0.7))
 }
 
@@ -136,9 +148,10 @@ pub(super) fn far_voxels(distance: f64) -> Setup {
     setup(scene, look(center + DVec3::new(0.3, 0.2, 1.0).normalize_or(DVec3::Z) * distance, center, fov))
 }
 
-/// The still life, scaled with its camera.
+/// The default scene, scaled with its camera: shapes of all kinds.
 pub(super) fn scaled(scale: f64) -> Setup {
-    let scene = placed(still_life(), DAffine3::from_scale(DVec3::splat(scale)));
+    let scene =
+        placed(builtin::scene("atelier").unwrap_or_default(), DAffine3::from_scale(DVec3::splat(scale)));
     let camera = front(&scene);
     setup(scene, camera)
 }
@@ -215,7 +228,7 @@ pub(super) fn supersampled(setup: &mut Setup) {
 /// Takes a conversion no coarser than a twentieth of a pixel.
 pub(super) fn finer(setup: &mut Setup) {
     setup.need.tolerance_px = 0.05;
-    setup.settings.push(("detail.resolution", "512"));
+    setup.settings.push(("detail.resolution", "512".to_owned()));
 }
 
 /// A ball with the eye so far before its surface; negative is inside.
@@ -253,7 +266,7 @@ pub(super) fn shadow_contact(gap: f64) -> Setup {
 
 /// Asks for the finest shadow map.
 pub(super) fn fine_shadow(setup: &mut Setup) {
-    setup.settings.push(("shadow.map_size", "8192"));
+    setup.settings.push(("shadow.map_size", "8192".to_owned()));
 }
 
 /// Blocks in a ring, with the eye in their middle and so many degrees of view.

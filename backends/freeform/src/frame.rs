@@ -17,7 +17,6 @@ use polyptych_core::shade::{facing, fogged};
 /// How to draw.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Options {
-    pub(crate) shadows: bool,
     /// Step through volumes in units of the smallest spacing.
     pub(crate) volume_step: f64,
 }
@@ -167,7 +166,8 @@ impl FrameDrawing<'_> {
 
     fn illumination(&self) -> Illumination<'_> {
         let wanted = self.channels.has(Channel::Color) || self.channels.has(Channel::Shadow);
-        Illumination { world: self.world, shadows: self.options.shadows, wanted }
+        let reads_color = self.channels.has(Channel::Color) || self.channels.has(Channel::Albedo);
+        Illumination { world: self.world, wanted, reads_color }
     }
 
     /// Gathers see-through surfaces and volumes in front of the opaque ones, layer by layer.

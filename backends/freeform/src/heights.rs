@@ -40,6 +40,17 @@ impl HeightBody {
         Self { levels }
     }
 
+    /// Returns what [`HeightBody::bytes`] will be: ranges of cells, of blocks of four cells, and so on.
+    pub(crate) fn planned_bytes(field: &HeightField) -> u64 {
+        let (mut columns, mut rows) = (u64::from(field.columns() - 1), u64::from(field.rows() - 1));
+        let mut ranges = columns * rows;
+        while columns * rows > 1 {
+            (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
+            ranges += columns * rows;
+        }
+        ranges * 8
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         self.levels.iter().map(|l| l.ranges.len() as u64 * 8).sum()
     }

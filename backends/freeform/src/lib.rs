@@ -19,6 +19,7 @@ mod form;
 mod frame;
 mod heights;
 mod light;
+mod plan;
 mod program;
 mod renderer;
 mod roots;

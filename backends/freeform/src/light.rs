@@ -29,9 +29,10 @@ pub(crate) struct Scratch {
 #[derive(Clone, Copy)]
 pub(crate) struct Illumination<'a> {
     pub(crate) world: &'a World,
-    pub(crate) shadows: bool,
     /// Whether light is asked for at all.
     pub(crate) wanted: bool,
+    /// Whether the colors of surfaces are.
+    pub(crate) reads_color: bool,
 }
 
 impl Lit<'_> {
@@ -63,15 +64,16 @@ impl<'a> Illumination<'a> {
                 let body = hits.body.0[i];
                 if lit.points.material[i].is_none() {
                     let body_of = &self.world.bodies[body as usize];
-                    body_of.fill(scene, rays, hits, hits.of(body), &mut lit.points);
+                    body_of.fill(scene, rays, hits, hits.of(body), self.reads_color, &mut lit.points);
                 }
                 if let Some(m) = lit.points.material[i] {
                     lit.color.set(i, m.emission + ambient * lit.points.color.get(i) * m.ambient);
                 }
             }
         }
-        for light in self.world.lights.iter().filter(|_| self.wanted) {
-            self.add(light, rays, lit, (scratch, form), traced);
+        let lights = self.world.lights.iter().zip(&self.world.blocked);
+        for (light, &is_blocked) in lights.filter(|_| self.wanted) {
+            self.add(light, is_blocked, rays, lit, (scratch, form), traced);
         }
     }
 
@@ -80,6 +82,7 @@ impl<'a> Illumination<'a> {
     fn add(
         &self,
         light: &Light,
+        is_blocked: bool,
         rays: &[Rays],
         lit: &mut [Lit<'_>; OCTETS],
         (scratch, form): (&mut Scratch, &mut FormScratch),
@@ -100,7 +103,7 @@ impl<'a> Illumination<'a> {
         }
         scratch.blocked.clear();
         scratch.blocked.extend(scratch.rays.iter().map(Hits::nothing));
-        if light.casts_shadow && self.shadows {
+        if is_blocked {
             *traced += scratch.rays.iter().map(|r| u64::from(r.open().count())).sum::<u64>();
             self.block(scratch, form);
         }

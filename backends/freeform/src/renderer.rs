@@ -2,15 +2,16 @@
 
 use crate::bundle::TILE;
 use crate::frame::{FrameDrawing, Options, Scratch};
+use crate::plan::plan;
 use crate::world::{Body, Geometry, World};
 use polyptych_core::convert::{Converter, Detail};
-use polyptych_core::framebuffer::{Channels, Framebuffer};
-use polyptych_core::scene::{Object, Scene, Shape, ShapeKind};
+use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
+use polyptych_core::scene::{Light, Object, Scene, Shape, ShapeKind};
 use polyptych_core::seam::{
-    BackendFactory, BackendInfo, Control, Counter, Decision, Frame, Need, ObjectPlan, Parameter,
-    ParameterKind, PassPlan, Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Value,
+    self, BackendFactory, BackendInfo, Control, Counter, Decision, Demand, Frame, Need, Parameter,
+    ParameterKind, Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Surfaces, Value,
 };
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Makes [`Freeform`] renderers.
@@ -91,17 +92,20 @@ impl Freeform {
             info: info(),
             kept: HashMap::new(),
             world: None,
-            options: Options { shadows: true, volume_step: 0.5 },
+            options: Options { volume_step: 0.5 },
             scratch: Vec::new(),
             bytes: 0,
         }
     }
 
     fn detail(&self, need: &Need, object: &Object) -> Detail {
-        Detail {
-            tolerance: need.world_tolerance(&object.bounds()),
-            max_resolution: need.settings.int(&self.info.parameters, "detail.resolution") as u32,
-        }
+        seam::detail(object, need, need.settings.int(&self.info.parameters, "detail.resolution") as u32)
+    }
+
+    /// What a picture takes.
+    fn demand(&self, scene: &Scene, need: &Need, lights: &[Light]) -> Demand {
+        let switch = need.settings.bool(&self.info.parameters, "shadow");
+        Demand::of(scene, need, lights, switch, Surfaces::Smooth)
     }
 
     /// Returns what is cast of an object and how that stands to the object as given.
@@ -124,18 +128,23 @@ impl Freeform {
         }
         let detail = self.detail(need, object);
         let model = converter.distance(scene, object, detail, control.threads).map_err(|e| e.reason)?;
-        let decision = Decision::Converted { bound: model.bound, why: model.why.clone() };
+        let decision = converted(object, model.bound, &model.why);
         Ok((Arc::new(Geometry::Field(model)), decision))
     }
 }
 
-/// Says why an object cannot be drawn, if that is so.
-fn why_skipped(object: &Object) -> Option<&'static str> {
-    if object.visible { object.why_undrawable() } else { Some("it is invisible") }
+/// Says how an object is drawn that was converted.
+pub(crate) fn converted(object: &Object, bound: f64, why: &str) -> Decision {
+    let left_out = seam::left_out(&object.shape);
+    if left_out.is_empty() {
+        Decision::Converted { bound, why: why.to_owned() }
+    } else {
+        Decision::Approximated { why: format!("{why}; {}", left_out.join("; ")) }
+    }
 }
 
 /// Weakens a decision by what this back end leaves out of a material.
-fn with_material(scene: &Scene, object: &Object, decision: Decision) -> Decision {
+pub(crate) fn with_material(scene: &Scene, object: &Object, decision: Decision) -> Decision {
     let mirror = (0..object.materials.len()).any(|slot| scene.material(object, slot).reflectivity > 0.0);
     match decision {
         Decision::Exact if mirror => {
@@ -154,53 +163,10 @@ impl Renderer for Freeform {
     }
 
     fn plan(&self, scene: &Scene, need: &Need) -> Plan {
-        let converter = Converter::default();
-        let objects: Vec<ObjectPlan> = scene
-            .objects
-            .iter()
-            .map(|object| {
-                let (decision, builds, bytes) = match why_skipped(object) {
-                    Some(why) => (Decision::Skipped { why: why.to_owned() }, String::new(), 0),
-                    None if self.info.draws(object.shape.kind()) => {
-                        let bytes = match &*object.shape {
-                            Shape::Volume(v) => v.samples().len() as u64 * 4,
-                            Shape::HeightField(h) => h.heights().len() as u64 * 11,
-                            Shape::FreeForm(f) => f.form().node_count() as u64 * 104,
-                            _ => 512,
-                        };
-                        (with_material(scene, object, Decision::Exact), String::new(), bytes)
-                    }
-                    None => {
-                        let forecast = converter.distance_forecast(scene, object, self.detail(need, object));
-                        let why = "drawn as the zero level of signed distances".to_owned();
-                        let decision = Decision::Converted { bound: forecast.bound, why };
-                        (with_material(scene, object, decision), forecast.builds, forecast.bytes)
-                    }
-                };
-                let (name, shape) = (object.name.clone(), object.shape.kind().name());
-                ObjectPlan { name, shape, decision, builds, bytes }
-            })
-            .collect();
-        let pixels = f64::from(need.width) * f64::from(need.height);
-        let shadows = need.settings.bool(&self.info.parameters, "shadow");
-        let casting = scene.lights.iter().filter(|l| l.casts_shadow).count();
-        Plan {
-            bytes: objects.iter().map(|o| o.bytes).sum(),
-            passes: vec![
-                PassPlan { name: "primary rays".to_owned(), needed: true, why: "one a pixel".to_owned() },
-                PassPlan {
-                    name: "shadow rays".to_owned(),
-                    needed: shadows && casting > 0,
-                    why: format!(
-                        "{casting} lights cast shadows, shadows are {}",
-                        if shadows { "on" } else { "off" }
-                    ),
-                },
-            ],
-            // A quarter of a microsecond a ray and function layer, measured on the built-in scenes.
-            estimated_ms: pixels * 2.5e-4 * (1.0 + casting as f64 * f64::from(u8::from(shadows))),
-            objects,
-        }
+        let lights = scene.all_lights();
+        let demand = self.demand(scene, need, &lights);
+        let step = need.settings.float(&self.info.parameters, "volume.step");
+        plan(scene, need, &demand, step, |object| self.detail(need, object))
     }
 
     fn prepare(
@@ -210,17 +176,14 @@ impl Renderer for Freeform {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
-        self.options = Options {
-            shadows: need.settings.bool(&self.info.parameters, "shadow"),
-            volume_step: need.settings.float(&self.info.parameters, "volume.step"),
-        };
+        self.options = Options { volume_step: need.settings.float(&self.info.parameters, "volume.step") };
         // Shapes that are gone from the scene are let go.
         self.kept.retain(|_, (shape, _)| scene.objects.iter().any(|o| Arc::ptr_eq(&o.shape, shape)));
         let mut bodies = Vec::new();
         let mut decisions = Vec::with_capacity(scene.objects.len());
         for (index, object) in scene.objects.iter().enumerate() {
             control.check()?;
-            let built = match why_skipped(object) {
+            let built = match seam::why_not_drawn(object) {
                 Some(why) => Err(why.to_owned()),
                 None => self.geometry(scene, object, need, converter, control),
             };
@@ -235,12 +198,19 @@ impl Renderer for Freeform {
                 Err(why) => Decision::Skipped { why },
             });
         }
-        self.bytes = bodies.iter().map(|b| b.geometry.bytes()).sum();
+        let mut seen = HashSet::new();
+        let own = bodies.iter().filter(|b| seen.insert(Arc::as_ptr(&b.geometry)));
+        self.bytes = own.map(|b| b.geometry.bytes()).sum();
         let decisions: Arc<[Decision]> = decisions.into();
+        let lights = scene.all_lights();
+        // A frame may ask for more channels than were needed: rays toward lights must know their way all the same.
+        let all = Need { channels: need.channels.with(Channel::Color), ..need.clone() };
+        let demand = self.demand(scene, &all, &lights);
         self.world = Some(World {
             scene: scene.clone(),
             bodies,
-            lights: scene.all_lights(),
+            blocked: demand.shadows.iter().map(Result::is_ok).collect(),
+            lights,
             decisions: decisions.clone(),
         });
         Ok(Prepared { objects: decisions, bytes: self.bytes })

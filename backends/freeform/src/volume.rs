@@ -89,6 +89,12 @@ impl VolumeBody {
         body
     }
 
+    /// Returns what [`VolumeBody::bytes`] will be.
+    pub(crate) fn planned_bytes(volume: &Volume) -> u64 {
+        let bricks: u64 = volume.size().map(|s| u64::from(s.div_ceil(BRICK))).iter().product();
+        volume.samples().len() as u64 * 4 + bricks
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         self.values.len() as u64 * 4 + self.clear.len() as u64
     }

@@ -18,6 +18,8 @@ pub(crate) struct World {
     pub(crate) scene: Arc<Scene>,
     pub(crate) bodies: Vec<Body>,
     pub(crate) lights: Vec<Light>,
+    /// For each light whether anything can stand between it and a surface, so that shadow rays are cast.
+    pub(crate) blocked: Vec<bool>,
     pub(crate) decisions: Arc<[Decision]>,
 }
 
@@ -87,6 +89,21 @@ impl Geometry {
             Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume)),
             Shape::Mesh(_) | Shape::Voxels(_) => return None,
         })
+    }
+
+    /// Returns what [`Geometry::bytes`] will be for a shape that is drawn as given; nothing for others.
+    pub(crate) fn planned_bytes(shape: &Shape) -> u64 {
+        match shape {
+            Shape::Primitive(Primitive::Plane { .. }) => 16,
+            // A form as steps is as large as what is written of it here.
+            Shape::Primitive(primitive) => {
+                FreeForm::from_primitive(primitive).map_or(0, |form| FormBody::new(&form).bytes())
+            }
+            Shape::FreeForm(form) => FormBody::new(form).bytes(),
+            Shape::HeightField(heights) => HeightBody::planned_bytes(heights),
+            Shape::Volume(volume) => VolumeBody::planned_bytes(volume),
+            Shape::Mesh(_) | Shape::Voxels(_) => 0,
+        }
     }
 
     pub(crate) fn bytes(&self) -> u64 {
@@ -172,7 +189,7 @@ impl Body {
         }
     }
 
-    /// Fills in the points that some of eight rays met on this body.
+    /// Fills in the points that some of eight rays met on this body; `reads_color` tells whether their color matters.
     #[inline(always)]
     pub(crate) fn fill<'a>(
         &'a self,
@@ -180,6 +197,7 @@ impl Body {
         rays: &Rays,
         hits: &Hits,
         met: Mask8,
+        reads_color: bool,
         points: &mut Points<'a>,
     ) {
         let position = rays.origin + rays.direction.scaled(hits.t);
@@ -196,7 +214,12 @@ impl Body {
             let local = self.object_from_world.transform_point3(position.get(i));
             let place = self.place(local, normal.get(i), material);
             let unit = place.normal.normalize_or_zero();
-            let (c, o) = scene.base_color(place.material, place.uv, local.as_vec3(), unit.as_vec3(), 0.0);
+            // Without anyone to see the color, only holes and haze are worth a look at the texture.
+            let (c, o) = if reads_color || self.see_through {
+                scene.base_color(place.material, place.uv, local.as_vec3(), unit.as_vec3(), 0.0)
+            } else {
+                (place.material.base_color, place.material.opacity)
+            };
             normal.set(i, place.normal);
             color.set(i, c);
             opacity.0[i] = place.material.effective_opacity(o);

@@ -10,7 +10,7 @@ pub(crate) struct Conversion {
     matrix: glam::DMat3,
     /// Which slots let light through: it decides which faces of voxels are seen.
     see_through: Vec<bool>,
-    /// Half octaves of tolerance, the converter's own classes.
+    /// The converter's class of the tolerance.
     class: i32,
     pub(crate) model: Arc<MeshModel>,
 }
@@ -22,7 +22,7 @@ impl Conversion {
             shape: object.shape.clone(),
             matrix: object.world_from_object.matrix3,
             see_through: see_through(scene, object),
-            class: class(detail),
+            class: detail.class(object),
             model,
         }
     }
@@ -30,14 +30,10 @@ impl Conversion {
     /// Tells whether the conversion of an object would be the same.
     pub(crate) fn serves(&self, scene: &Scene, object: &Object, detail: Detail) -> bool {
         Arc::ptr_eq(&self.shape, &object.shape)
-            && self.class == class(detail)
+            && self.class == detail.class(object)
             && self.matrix == object.world_from_object.matrix3
             && self.see_through == see_through(scene, object)
     }
-}
-
-fn class(detail: Detail) -> i32 {
-    (detail.tolerance.log2() * 2.0 + 1e-9).floor() as i32
 }
 
 fn see_through(scene: &Scene, object: &Object) -> Vec<bool> {

@@ -5,8 +5,8 @@ use crate::light::Lamp;
 use crate::shadow::MapSizes;
 use polyptych_core::camera::Projection;
 use polyptych_core::convert::Detail;
-use polyptych_core::scene::{LightKind, Material, Mesh, Object, Scene, Shape};
-use polyptych_core::seam::{Decision, Need};
+use polyptych_core::scene::{LightKind, Material, Object, Scene, Shape};
+use polyptych_core::seam::{self, Decision, Demand, Need, Surfaces};
 
 /// Most cells along an edge that a free form is converted on.
 const FINEST: u32 = 256;
@@ -16,50 +16,41 @@ pub(crate) const RESAMPLED: &str = "resampled from perspective faces";
 
 /// How fine an object is to be converted.
 pub(crate) fn detail(object: &Object, need: &Need) -> Detail {
-    Detail { tolerance: need.world_tolerance(&object.bounds()), max_resolution: FINEST }
+    seam::detail(object, need, FINEST)
+}
+
+/// What a picture takes.
+pub(crate) fn demand(scene: &Scene, need: &Need, lamps: &[Lamp], options: Options) -> Demand {
+    let shows_shadows = options.mode == Mode::Shadowed;
+    Demand::of(scene, need, &Lamp::lights(lamps), shows_shadows, Surfaces::Smooth)
 }
 
 /// Says why an object is not drawn, if that is so.
 pub(crate) fn why_skipped(object: &Object, draws_lines: bool) -> Option<String> {
-    if !object.visible {
-        return Some("it is invisible".to_owned());
-    }
-    if let Some(why) = object.why_undrawable() {
-        return Some(why.to_owned());
-    }
-    match &*object.shape {
-        Shape::Mesh(mesh) if mesh.triangles.is_empty() && !draws_lines => {
-            Some("line segments have no area: they are drawn in modes hidden-line and wireframe".to_owned())
+    let has_lines = matches!(&*object.shape, Shape::Mesh(mesh) if !mesh.segments.is_empty());
+    match seam::why_not_drawn(object) {
+        Some(_) if has_lines && draws_lines && object.visible => object.why_undrawable().map(str::to_owned),
+        Some(why) if has_lines && object.visible => {
+            Some(format!("{why}: they are drawn in modes hidden-line and wireframe"))
         }
-        _ => None,
+        why => why.map(str::to_owned),
     }
 }
 
 /// Says what is lost of an object itself.
 pub(crate) fn losses(scene: &Scene, object: &Object, draws_lines: bool) -> Vec<String> {
     let mut losses = Vec::new();
-    if let Shape::Mesh(mesh) = &*object.shape {
-        losses.extend(mesh_losses(mesh, draws_lines));
+    let mut left_out = seam::left_out(&object.shape);
+    if draws_lines {
+        left_out.retain(|loss| !loss.contains("segments"));
     }
+    losses.extend(left_out);
     let materials = || (0..object.materials.len().max(1)).map(|slot| scene.material(object, slot));
     if matches!(*object.shape, Shape::Voxels(_)) && materials().any(Material::is_see_through) {
         losses.push("see-through voxels are drawn as their outer faces".to_owned());
     }
     if materials().any(|m| m.reflectivity > 0.0) {
         losses.push("reflections are not drawn".to_owned());
-    }
-    losses
-}
-
-fn mesh_losses(mesh: &Mesh, draws_lines: bool) -> Vec<String> {
-    let mut losses = Vec::new();
-    if !mesh.segments.is_empty() && !draws_lines {
-        losses.push(format!("{} line segments are left out: they have no area", mesh.segments.len()));
-    }
-    let broken =
-        (0..mesh.triangles.len()).filter(|&t| !mesh.corners(t).iter().all(|c| c.is_finite())).count();
-    if broken > 0 {
-        losses.push(format!("{broken} triangles with corners that are not finite are left out"));
     }
     losses
 }

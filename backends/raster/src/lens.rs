@@ -3,6 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::lanes::{DVec3x8, F64x8};
+use polyptych_core::math::Aabb;
 
 /// Pixels around the picture up to which triangles are drawn unclipped. Coordinates there fit 24.8 bits for
 /// pictures of any sensible size.
@@ -20,6 +21,8 @@ pub(crate) struct Lens {
     /// What is less far ahead is not drawn.
     pub(crate) near: f64,
     pub(crate) rays: Rays,
+    /// What is taken off depths: that of the farthest place that is drawn.
+    farthest: f64,
     column: Row,
     row: Row,
     ahead: Row,
@@ -120,6 +123,7 @@ impl Lens {
             height: size[1],
             near,
             rays: Rays::Central,
+            farthest: 0.0,
             column: Row { slope: inverse.x_axis * scale + forward * half[0], offset: 0.0 },
             row: Row { slope: forward * half[1] - inverse.y_axis * scale, offset: 0.0 },
             ahead: Row { slope: forward, offset: 0.0 },
@@ -142,6 +146,7 @@ impl Lens {
             height: size[1],
             near: 0.0,
             rays: Rays::Parallel,
+            farthest: 0.0,
             column: Row { slope: inverse.x_axis * scale[0], offset: half[0] },
             row: Row { slope: inverse.y_axis * -scale[1], offset: half[1] },
             ahead: Row { slope: -inverse.z_axis, offset: 0.0 },
@@ -164,6 +169,17 @@ impl Lens {
             }
             Projection::Fisheye { .. } | Projection::Cylindrical { .. } | Projection::Warp(_) => None,
         }
+    }
+
+    /// Counts depths from the farthest corner of a box on: what is small in front of how far away it is has all
+    /// digits of a depth for itself.
+    pub(crate) fn with_depths_of(mut self, bounds: &Aabb) -> Self {
+        let ahead = bounds.corners().map(|c| self.ahead.at(c - self.origin));
+        let farthest = self.depth(ahead.into_iter().fold(self.near, f64::max));
+        if !bounds.is_empty() && farthest.is_finite() && ahead.iter().all(|a| a.is_finite()) {
+            self.farthest = farthest;
+        }
+        self
     }
 
     /// Returns the lens for points of an object.
@@ -241,11 +257,12 @@ impl Lens {
     }
 
     /// Returns the depth that is compared: larger is nearer, and it is linear over the picture. `1/w` keeps the
-    /// same number of digits at every distance, so there is no far plane.
+    /// same number of digits at every distance, so there is no far plane; less that of the farthest place it has
+    /// as many for the differences within a scene that is far away.
     pub(crate) fn depth(&self, ahead: f64) -> f64 {
         match self.rays {
-            Rays::Central => 1.0 / ahead,
-            Rays::Parallel => -ahead,
+            Rays::Central => 1.0 / ahead - self.farthest,
+            Rays::Parallel => -ahead - self.farthest,
         }
     }
 }
@@ -254,8 +271,8 @@ impl Lens {
     /// Returns the distance ahead of a depth.
     pub(crate) fn ahead(&self, depth: f64) -> f64 {
         match self.rays {
-            Rays::Central => 1.0 / depth,
-            Rays::Parallel => -depth,
+            Rays::Central => 1.0 / (depth + self.farthest),
+            Rays::Parallel => -(depth + self.farthest),
         }
     }
 
@@ -351,6 +368,34 @@ mod tests {
                 assert!((column - x).abs() < 1e-12 && (row - y).abs() < 1e-12 && ahead > 0.0);
             }
         }
+    }
+
+    #[test]
+    fn depths_tell_a_ten_thousandth_of_a_scene_apart_however_far_away_it_is() {
+        let bounds = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
+        let axes = DMat3::IDENTITY;
+        for power in 0..9 {
+            let far = DVec3::Z * (4.0 * 10f64.powi(power));
+            for lens in [
+                Lens::central(far, axes, 50.0, [100, 100], 1e-3),
+                Lens::parallel(far, axes, [50.0; 2], [100, 100]),
+            ] {
+                let lens = lens.with_depths_of(&bounds);
+                let depth = |z: f64| lens.depth(far.z - z) as f32;
+                for step in -9..9 {
+                    let z = f64::from(step) * 0.1;
+                    assert!(depth(z + 1e-4) > depth(z), "10^{power}: {z}");
+                }
+                assert!(depth(-1.0) == 0.0 && depth(1.0).is_finite());
+                let ahead = lens.ahead(lens.depth(far.z - 0.5));
+                assert!(
+                    (ahead - (far.z - 0.5)).abs() < 1e-4 * (far.z / 4e8).max(1e-4),
+                    "10^{power}: {ahead}"
+                );
+            }
+        }
+        let empty = Lens::central(DVec3::ZERO, axes, 50.0, [100, 100], 1e-3).with_depths_of(&Aabb::EMPTY);
+        assert_eq!(empty.depth(2.0), 0.5);
     }
 
     #[test]

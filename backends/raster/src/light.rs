@@ -18,6 +18,8 @@ pub(crate) struct Lamp {
     steady: Option<Arriving>,
     /// The voxel that gives it off.
     pub(crate) cell: Option<Cell>,
+    /// Whether anything can stand between it and a surface, so that its shadows must be found.
+    pub(crate) is_blocked: bool,
 }
 
 /// The place of an emissive voxel: its own faces do not block its light.
@@ -47,9 +49,17 @@ impl Lamp {
                 LightKind::Point { .. } | LightKind::Spot { .. } => None,
             },
             cell: if i < own { None } else { cells.next() },
+            is_blocked: light.casts_shadow,
             light,
         };
         lights.into_iter().enumerate().map(lamp).collect()
+    }
+}
+
+impl Lamp {
+    /// Lists the lights themselves.
+    pub(crate) fn lights(lamps: &[Self]) -> Vec<Light> {
+        lamps.iter().map(|lamp| lamp.light.clone()).collect()
     }
 }
 

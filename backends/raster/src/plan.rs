@@ -1,60 +1,103 @@
 //! What would be built for a need, and what would that cost?
 
 use crate::decide::{
-    RESAMPLED, decision, detail, is_resampled, losses, losses_of_all, why_skipped, with_loss,
+    RESAMPLED, decision, demand, detail, is_resampled, losses, losses_of_all, why_skipped, with_loss,
 };
-use crate::info::{Mode, Options};
+use crate::info::Options;
 use crate::light::Lamp;
-use crate::shadow::MapSizes;
+use crate::shadow::{MapSizes, Shadows};
 use polyptych_core::convert::Converter;
-use polyptych_core::framebuffer::Channel;
-use polyptych_core::scene::{LightKind, Object, Scene, Shape};
-use polyptych_core::seam::{Decision, Need, ObjectPlan, PassPlan, Plan};
+use polyptych_core::scene::{Object, Scene, Shape};
+use polyptych_core::seam::{Decision, Demand, Need, ObjectPlan, PassPlan, Plan, Survey};
+use std::collections::HashSet;
+use std::sync::Arc;
 
-/// Milliseconds for a triangle and for a pixel on one thread, measured.
-const PER_TRIANGLE: f64 = 60e-6;
-const PER_PIXEL: f64 = 25e-6;
-/// Bytes of a triangle with its share of vertices.
-const TRIANGLE_BYTES: f64 = 30.0;
+/// Nanoseconds on one thread of the machine that all back ends' constants were measured on.
+mod nanoseconds {
+    /// A vertex, transformed.
+    pub(super) const VERTEX: f64 = 4.0;
+    /// A triangle, set up and drawn.
+    pub(super) const TRIANGLE: f64 = 52.0;
+    /// A pixel of the background.
+    pub(super) const PIXEL: f64 = 8.0;
+    /// A pixel of a surface, resolved.
+    pub(super) const SURFACE: f64 = 30.0;
+    /// What a texture adds to that.
+    pub(super) const TEXEL: f64 = 40.0;
+    /// A light on a surface.
+    pub(super) const LIGHT: f64 = 20.0;
+    /// The look into its shadow map.
+    pub(super) const SHADOW: f64 = 30.0;
+}
+
+/// What would be drawn.
+#[derive(Default)]
+struct Amount {
+    vertices: f64,
+    triangles: f64,
+}
 
 pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
     let lamps = Lamp::all(scene);
     let sizes = MapSizes::new(options.map_size, &lamps);
+    let demand = demand(scene, need, &lamps, options);
     let of_all = losses_of_all(scene, &lamps, options, sizes);
     let bends = is_resampled(&need.camera.projection);
     let forecasts = Converter::default();
-    let mut triangles = 0.0;
+    let (mut amount, mut known) = (Amount::default(), HashSet::new());
+    let draws_lines = options.mode.draws_lines();
     let objects: Vec<ObjectPlan> = scene
         .objects
         .iter()
         .map(|object| {
-            let mut plan =
-                plan_object(&forecasts, scene, object, need, options.mode.draws_lines(), &mut triangles);
+            let mut plan = plan_object(&forecasts, scene, object, need, draws_lines, &mut amount);
+            // Objects of one shape and size share its triangles.
+            let size = object.world_from_object.matrix3.to_cols_array().map(f64::to_bits);
+            if !known.insert((Arc::as_ptr(&object.shape), detail(object, need).class(object), size)) {
+                plan.bytes = 0;
+            }
             for loss in of_all.iter().copied().chain(bends.then_some(RESAMPLED)) {
                 plan.decision = with_loss(&plan.decision, loss);
             }
             plan
         })
         .collect();
-    let mut passes = vec![
-        PassPlan {
-            name: "visibility".to_owned(),
-            needed: true,
-            why: "nearest triangle of a pixel".to_owned(),
-        },
-        see_through(scene),
-    ];
+    let mut passes = vec![PassPlan {
+        name: "visibility".to_owned(),
+        needed: true,
+        why: "nearest triangle of a pixel".to_owned(),
+    }];
+    passes.extend(demand.passes());
     let mut bytes: u64 = objects.iter().map(|o| o.bytes).sum();
-    let blocks = scene.objects.iter().any(|object| blocks_light(scene, object));
-    for (index, lamp) in lamps.iter().enumerate() {
-        let pass = plan_map(index, lamp, need, options, blocks);
-        if pass.needed {
-            bytes += map_bytes(&lamp.light.kind, sizes);
+    let mut of_blockers = 0;
+    for (index, (lamp, shadow)) in lamps.iter().zip(&demand.shadows).enumerate() {
+        if shadow.is_ok() {
+            let (map, of_triangle) = Shadows::planned_bytes(&lamp.light.kind, sizes);
+            bytes += map;
+            of_blockers = of_triangle * amount.triangles as u64;
         }
-        passes.push(pass);
+        passes.push(PassPlan {
+            name: format!("shadow map of light {index}"),
+            needed: shadow.is_ok(),
+            why: shadow.err().unwrap_or("the light casts shadows").to_owned(),
+        });
     }
+    bytes += of_blockers;
+    let estimated_ms = milliseconds(scene, need, &demand, &amount, options.samples);
+    Plan { objects, passes, bytes, estimated_ms }
+}
+
+fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, amount: &Amount, samples: u32) -> f64 {
+    use nanoseconds::{LIGHT, PIXEL, SHADOW, SURFACE, TEXEL, TRIANGLE, VERTEX};
+    let seen = Survey::of(scene, need).seen;
+    let texture = if demand.textures.is_some() { TEXEL } else { 0.0 };
+    let lights = demand.shadows.len() as f64 * LIGHT + demand.shadow_count() as f64 * SHADOW;
+    let shading = if demand.shading { texture + lights } else { 0.0 };
     let pixels = f64::from(need.width) * f64::from(need.height);
-    Plan { objects, passes, bytes, estimated_ms: triangles * PER_TRIANGLE + pixels * PER_PIXEL }
+    // Visibility is found at every sample, a triangle shaded once in a pixel.
+    let triangles = amount.triangles * TRIANGLE * f64::from(samples).sqrt();
+    let of_pixel = PIXEL * f64::from(samples) + seen * (SURFACE + shading);
+    (amount.vertices * VERTEX + triangles + pixels * of_pixel) * 1e-6
 }
 
 fn plan_object(
@@ -63,7 +106,7 @@ fn plan_object(
     object: &Object,
     need: &Need,
     draws_lines: bool,
-    triangles: &mut f64,
+    amount: &mut Amount,
 ) -> ObjectPlan {
     let mut plan = ObjectPlan {
         name: object.name.clone(),
@@ -78,48 +121,16 @@ fn plan_object(
     }
     let mut converted = None;
     if let Shape::Mesh(mesh) = &*object.shape {
-        *triangles += mesh.triangles.len() as f64;
+        amount.vertices += mesh.positions.len() as f64;
+        amount.triangles += mesh.triangles.len() as f64;
     } else {
         let forecast = forecasts.mesh_forecast(scene, object, detail(object, need));
-        *triangles += forecast.bytes as f64 / TRIANGLE_BYTES;
+        amount.vertices += forecast.vertices as f64;
+        amount.triangles += forecast.triangles as f64;
         plan.builds = forecast.builds.clone();
         plan.bytes = forecast.bytes;
         converted = Some((forecast.bound, forecast.builds));
     }
     plan.decision = decision(object, converted, losses(scene, object, draws_lines));
     plan
-}
-
-fn see_through(scene: &Scene) -> PassPlan {
-    let used = |o: &Object| (0..o.materials.len().max(1)).any(|s| scene.material(o, s).is_see_through());
-    let needed = scene.objects.iter().filter(|o| o.is_drawable()).any(used);
-    let why = if needed { "a material lets light through" } else { "everything is opaque" };
-    PassPlan { name: "see-through layers".to_owned(), needed, why: why.to_owned() }
-}
-
-/// Tells whether an object can block light: volumes and what is see-through let it pass.
-fn blocks_light(scene: &Scene, object: &Object) -> bool {
-    why_skipped(object, false).is_none()
-        && !matches!(&*object.shape, Shape::Volume(_))
-        && (0..object.materials.len().max(1)).any(|slot| !scene.material(object, slot).is_see_through())
-}
-
-fn plan_map(index: usize, lamp: &Lamp, need: &Need, options: Options, blocks: bool) -> PassPlan {
-    let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
-    let (needed, why) = match (options.mode == Mode::Shadowed, asked, lamp.light.casts_shadow) {
-        (false, _, _) => (false, "shadows are switched off"),
-        (_, false, _) => (false, "neither color nor shadow is asked for"),
-        (_, _, false) => (false, "the light casts no shadow"),
-        _ if !blocks => (false, "nothing blocks light"),
-        _ => (true, "the light casts shadows"),
-    };
-    PassPlan { name: format!("shadow map of light {index}"), needed, why: why.to_owned() }
-}
-
-fn map_bytes(kind: &LightKind, sizes: MapSizes) -> u64 {
-    let square = |edge: u32| u64::from(edge) * u64::from(edge) * 4;
-    match kind {
-        LightKind::Directional { .. } => square(sizes.directional),
-        LightKind::Point { .. } | LightKind::Spot { .. } => sizes.local.map_or(0, |edge| 6 * square(edge)),
-    }
 }

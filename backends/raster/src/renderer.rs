@@ -207,7 +207,15 @@ impl Renderer for Raster {
         let before = self.ready.take();
         let options = Options::of(need, &self.info);
         let (model, given) = self.build_model(before.as_ref(), scene, need, converter, control)?;
-        let lamps = Lamp::all(scene);
+        let mut lamps = Lamp::all(scene);
+        let demand = decide::demand(scene, need, &lamps, options);
+        // What stands before a light depends neither on the mode nor on the channels, which may change back.
+        let all = Need { channels: need.channels.with(Channel::Color), ..need.clone() };
+        let of_all = decide::demand(scene, &all, &lamps, Options { mode: Mode::Shadowed, ..options });
+        for (lamp, shadow) in lamps.iter_mut().zip(&of_all.shadows) {
+            lamp.is_blocked = shadow.is_ok();
+        }
+        let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
         let sizes = MapSizes::new(options.map_size, &lamps);
         let mut decisions = given.to_vec();
         for loss in decide::losses_of_all(scene, &lamps, options, sizes) {
@@ -215,8 +223,6 @@ impl Renderer for Raster {
         }
         let kept = before.as_ref().filter(|b| Arc::ptr_eq(&b.model, &model)).and_then(|b| b.lines.clone());
         let lines = options.mode.draws_lines().then(|| kept.unwrap_or_else(|| Arc::new(Lines::of(&model))));
-        let casts = lamps.iter().any(|l| l.light.casts_shadow);
-        let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
         let mut ready = Ready {
             scene: scene.clone(),
             model,
@@ -233,7 +239,7 @@ impl Renderer for Raster {
             as_drawn: OnceLock::new(),
         };
         let (kept, old) = before.map_or((None, None), |b| b.shadows_for(&ready));
-        if options.mode == Mode::Shadowed && casts && asked {
+        if demand.any_shadow() {
             ready.shadows = Some(match kept {
                 Some(kept) => kept,
                 None => Arc::new(self.scratch.draw_shadows(&ready, old, control)?),
@@ -266,7 +272,14 @@ impl Renderer for Raster {
         let mut work = Work { phases: Phases::start(), triangles: 0, shaded: 0 };
         let near = ready.near(&frame.camera);
         match Lens::of_camera(&frame.camera, width, height, near) {
-            Some(lens) => self.scratch.draw(ready, &lens, target, Announce::Yes, &mut work, control)?,
+            Some(lens) => self.scratch.draw(
+                ready,
+                &lens.with_depths_of(&ready.model.bounds),
+                target,
+                Announce::Yes,
+                &mut work,
+                control,
+            )?,
             None => self.scratch.draw_bent(ready, &frame.camera, target, &mut work, control)?,
         }
         let mut counters = [None; 6];
@@ -324,7 +337,7 @@ impl Scratch {
         let edge = self.faces.reserve(&view, width, height, target.channels());
         let needed = needed(camera, width, height, control.threads);
         for face in (0..6).filter(|face| needed >> face & 1 == 1) {
-            let lens = face_lens(camera, face, edge, ready.near(camera));
+            let lens = face_lens(camera, face, edge, ready.near(camera)).with_depths_of(&ready.model.bounds);
             let buffers = (&mut self.vertices, &mut self.bins, &mut self.strokes, &mut self.bands);
             let picture = self.faces.picture(face);
             draw(ready, &lens, picture, Announce::No, work, control, buffers)?;
@@ -414,7 +427,12 @@ impl Ready {
     }
 
     fn bytes(&self) -> u64 {
-        let converted = |s: &Source| if let Source::Converted(m) = s { m.mesh.bytes() } else { 0 };
+        // Objects of one shape share its triangles.
+        let mut seen = std::collections::HashSet::new();
+        let mut converted = |s: &Source| match s {
+            Source::Converted(m) if seen.insert(Arc::as_ptr(m)) => m.mesh.bytes(),
+            _ => 0,
+        };
         self.model.parts.iter().map(|p| converted(&p.source)).sum::<u64>()
             + self.shadows.as_ref().or(self.resting_shadows.as_ref()).map_or(0, |s| s.bytes())
             + self.lines.as_ref().map_or(0, |lines| lines.bytes())
@@ -430,7 +448,12 @@ impl Ready {
             other.scene.materials.iter().any(|m| m.alpha != polyptych_core::scene::AlphaMode::Opaque);
         let same_masks = !has_masks || Arc::ptr_eq(&self.scene, &other.scene);
         let same_map = |(a, b): (&Lamp, &Lamp)| {
-            same_parts && same_masks && self.sizes == other.sizes && a.light == b.light && a.cell == b.cell
+            same_parts
+                && same_masks
+                && self.sizes == other.sizes
+                && a.light == b.light
+                && a.cell == b.cell
+                && a.is_blocked == b.is_blocked
         };
         let same_maps: Vec<bool> = self.lamps.iter().zip(&other.lamps).map(same_map).collect();
         if self.lamps.len() == other.lamps.len() && same_parts && same_maps.iter().all(|same| *same) {

@@ -211,7 +211,7 @@ impl Shadows {
             }
             let mut map = Map::default();
             let (bounds, left_out) = casters.of_light(model, &lamp.light.kind, lamp.cell);
-            if lamp.light.casts_shadow && !bounds.is_empty() {
+            if lamp.is_blocked && !bounds.is_empty() {
                 let bounds = Aabb::new(bounds.min - origin, bounds.max - origin);
                 for mut lens in lenses(&lamp.light.kind, sizes, &bounds, origin) {
                     control.check()?;
@@ -232,6 +232,18 @@ impl Shadows {
             shadows.maps.push(map);
         }
         Ok(shadows)
+    }
+
+    /// Returns the bytes of the map of a light, and those of a triangle that may block.
+    pub(crate) fn planned_bytes(kind: &LightKind, sizes: MapSizes) -> (u64, u64) {
+        let square = |edge: u32| (TileGrid::new(edge, edge).count() * TILE_PIXELS * 4) as u64;
+        let map = match kind {
+            LightKind::Directional { .. } => square(sizes.directional),
+            LightKind::Point { .. } | LightKind::Spot { .. } => {
+                sizes.local.map_or(0, |edge| faces_of(kind) * square(edge))
+            }
+        };
+        (map, size_of::<Blocker>() as u64)
     }
 
     /// Returns where the maps are in memory, to tell whether they were kept.
@@ -393,14 +405,16 @@ fn lenses(kind: &LightKind, sizes: MapSizes, bounds: &Aabb, origin: DVec3) -> Ve
             let Some(edge) = local else { return Vec::new() };
             let position = position - origin;
             let scale = f64::from(edge.saturating_sub(4).max(1)) * 0.5 / outer.max(1e-3).tan();
-            vec![Lens::central(position, looking(direction), scale, [edge; 2], near(position))]
+            let lens = Lens::central(position, looking(direction), scale, [edge; 2], near(position));
+            vec![lens.with_depths_of(bounds)]
         }
         LightKind::Point { position } | LightKind::Spot { position, .. } => {
             let Some(edge) = local else { return Vec::new() };
             let position = position - origin;
             // Two texels more than a right angle on each side: the four texels of a place lie on one face.
             let scale = f64::from(edge.saturating_sub(4).max(1)) * 0.5;
-            (0..6).map(|i| Lens::central(position, cube_axes(i), scale, [edge; 2], near(position))).collect()
+            let face = |i| Lens::central(position, cube_axes(i), scale, [edge; 2], near(position));
+            (0..6).map(|i| face(i).with_depths_of(bounds)).collect()
         }
     }
 }

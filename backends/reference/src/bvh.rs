@@ -31,6 +31,9 @@ struct Node {
     count: u32,
 }
 
+/// Boxes in a leaf of at most four, on the mean of many meshes.
+const FULL: f64 = 2.25;
+
 /// A box to be put into the tree, and its number.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounded {
@@ -111,6 +114,14 @@ impl Bvh {
     /// Lists the numbers of the boxes in the order of the leaves.
     pub(crate) fn order(&self) -> &[u32] {
         &self.order
+    }
+
+    /// Returns what [`Bvh::bytes`] will be: exact where each leaf holds one box, near it for leaves of more, which hold
+    /// [`FULL`] boxes on the mean.
+    pub(crate) fn planned_bytes(boxes: usize, leaf: usize) -> u64 {
+        let leaves = if leaf == 1 { boxes as f64 } else { (boxes as f64 / FULL).max(1.0) };
+        let nodes = if boxes == 0 { 0.0 } else { 2.0 * leaves - 1.0 };
+        (nodes * size_of::<Node>() as f64) as u64 + boxes as u64 * 4
     }
 
     pub(crate) fn bytes(&self) -> u64 {

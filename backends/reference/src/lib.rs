@@ -51,6 +51,7 @@
 )]
 
 mod bvh;
+mod cost;
 mod lights;
 mod line;
 mod march;

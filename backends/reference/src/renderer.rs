@@ -1,5 +1,6 @@
 //! How does the host drive the reference: plan, prepare, render?
 
+use crate::cost;
 use crate::lights::Lamp;
 use crate::march::Cloud;
 use crate::sampling::place_in_pixel;
@@ -13,8 +14,9 @@ use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
 use polyptych_core::scene::{Object, Scene, Shape, ShapeKind};
 use polyptych_core::seam::{
-    BackendFactory, BackendInfo, Control, Counter, Decision, Frame, Need, ObjectPlan, Parameter,
-    ParameterKind, PassPlan, Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Value,
+    self, BackendFactory, BackendInfo, Control, Counter, Decision, Demand, Frame, Need, ObjectPlan,
+    Parameter, ParameterKind, PassPlan, Phases, Plan, Prepared, Registry, RenderError, Renderer, Report,
+    Surfaces, Value,
 };
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -116,26 +118,10 @@ fn info() -> BackendInfo {
 
 /// Decides how an object is drawn: as given, but for what has no area or no place.
 fn decide(object: &Object) -> Decision {
-    let skipped = |why: &str| Decision::Skipped { why: why.to_owned() };
-    if !object.visible {
-        return skipped("it is hidden");
+    if let Some(why) = seam::why_not_drawn(object) {
+        return Decision::Skipped { why: why.to_owned() };
     }
-    if let Some(why) = object.why_undrawable() {
-        return skipped(why);
-    }
-    let Shape::Mesh(mesh) = &*object.shape else { return Decision::Exact };
-    if mesh.triangles.is_empty() {
-        return skipped("line segments have no area");
-    }
-    let broken =
-        (0..mesh.triangles.len()).filter(|&t| !mesh.corners(t).iter().all(|c| c.is_finite())).count();
-    let mut left_out = Vec::new();
-    if !mesh.segments.is_empty() {
-        left_out.push(format!("{} line segments are left out: they have no area", mesh.segments.len()));
-    }
-    if broken > 0 {
-        left_out.push(format!("{broken} triangles with corners that are not finite are left out"));
-    }
+    let left_out = seam::left_out(&object.shape);
     if left_out.is_empty() { Decision::Exact } else { Decision::Approximated { why: left_out.join("; ") } }
 }
 
@@ -175,31 +161,36 @@ impl Renderer for Reference {
                 }
             })
             .collect();
-        let bytes = objects.iter().map(|o| o.bytes + size_of::<Item>() as u64).sum();
+        let of_kind = |is_cloud: bool| {
+            let drawn = scene.objects.iter().filter(|o| seam::why_not_drawn(o).is_none());
+            drawn.filter(|o| matches!(&*o.shape, Shape::Volume(_)) == is_cloud).count()
+        };
         let lights = scene.all_lights();
-        let shaded = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
-        let casting = lights.iter().filter(|l| l.casts_shadow).count();
+        let bytes = objects.iter().map(|o| o.bytes).sum::<u64>()
+            + World::planned_bytes(of_kind(false), of_kind(true), lights.len());
+        // The ruler casts every shadow ray: it must not rest on what it is to check.
+        let demand = Demand::of(scene, need, &lights, true, Surfaces::Stepped);
         let samples = self.samples(need);
-        let rays = f64::from(need.width) * f64::from(need.height) * f64::from(samples);
-        let shadow_rays = if shaded { rays * casting as f64 } else { 0.0 };
-        let passes = vec![
-            PassPlan {
-                name: "primary rays".to_owned(),
-                needed: true,
-                why: format!("{samples} for a pixel's color, its center for geometry"),
+        let mut passes = vec![PassPlan {
+            name: "primary rays".to_owned(),
+            needed: true,
+            why: format!("{samples} for a pixel's color, its center for geometry"),
+        }];
+        passes.extend(demand.passes());
+        let casting = lights.iter().filter(|l| l.casts_shadow).count();
+        let shades = demand.shading || need.channels.has(Channel::Shadow);
+        passes.push(PassPlan {
+            name: "shadow rays".to_owned(),
+            needed: shades && casting > 0,
+            why: match (shades, casting) {
+                (false, _) => "neither color nor shadow is asked for".to_owned(),
+                (true, 0) => "no light casts a shadow".to_owned(),
+                (true, n) => format!("{n} lights cast shadows"),
             },
-            PassPlan {
-                name: "shadow rays".to_owned(),
-                needed: shaded && casting > 0,
-                why: match (shaded, casting) {
-                    (false, _) => "neither color nor shadow is asked for".to_owned(),
-                    (true, 0) => "no light casts a shadow".to_owned(),
-                    (true, n) => format!("{n} lights cast shadows"),
-                },
-            },
-        ];
-        // About 1.5 microseconds a ray in a scene of moderate size.
-        Plan { objects, passes, bytes, estimated_ms: (rays + shadow_rays) * 1.5e-3 }
+        });
+        let step = need.settings.float(&self.info.parameters, "volume.step");
+        let estimated_ms = cost::milliseconds(scene, need, [lights.len(), casting], samples, step);
+        Plan { objects, passes, bytes, estimated_ms }
     }
 
     fn prepare(

@@ -123,6 +123,12 @@ impl World {
         Self { scene, items, tree: Bvh::build(boxes, 1), clouds, lamps }
     }
 
+    /// Returns what [`World::bytes`] will be for so many surfaces, volumes and lights.
+    pub(crate) fn planned_bytes(items: usize, clouds: usize, lamps: usize) -> u64 {
+        (items * size_of::<Item>() + clouds * size_of::<Cloud>() + lamps * size_of::<Lamp>()) as u64
+            + Bvh::planned_bytes(items, 1)
+    }
+
     /// Returns the bytes held without what geometries hold.
     pub(crate) fn bytes(&self) -> u64 {
         (self.items.len() * size_of::<Item>()

@@ -8,6 +8,8 @@ use polyptych_core::scene::{Arriving, Light, LightKind, Scene, Shape};
 #[derive(Clone, Debug)]
 pub(crate) struct Lamp {
     pub(crate) casts_shadow: bool,
+    /// Whether anything can stand between it and a surface, so that shadow rays are cast.
+    pub(crate) is_blocked: bool,
     light: Light,
     /// What arrives everywhere, for light that is parallel.
     everywhere: Option<Option<Arriving>>,
@@ -38,7 +40,12 @@ impl Lamp {
     fn new(light: Light, cell: Option<(DAffine3, DVec3)>) -> Self {
         let parallel = matches!(light.kind, LightKind::Directional { .. });
         let everywhere = parallel.then(|| light.arriving(DVec3::ZERO));
-        Self { casts_shadow: light.casts_shadow, light, everywhere, cell }
+        Self { casts_shadow: light.casts_shadow, is_blocked: light.casts_shadow, light, everywhere, cell }
+    }
+
+    /// Lists the lights themselves.
+    pub(crate) fn lights(lamps: &[Self]) -> Vec<Light> {
+        lamps.iter().map(|lamp| lamp.light.clone()).collect()
     }
 
     /// Returns the light that would arrive at a point if nothing were in between.

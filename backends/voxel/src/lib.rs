@@ -18,6 +18,7 @@ mod lamps;
 mod model;
 mod occupancy;
 mod paint;
+mod plan;
 mod renderer;
 mod trace;
 mod tree;

@@ -3,7 +3,7 @@
 use crate::grid::Grid;
 use polyptych_core::convert::{Converter, Detail, VoxelModel};
 use polyptych_core::scene::{Object, Scene, Shape, Voxels};
-use polyptych_core::seam::{Control, Decision, Need, RenderError};
+use polyptych_core::seam::{self, Control, Decision, Need, RenderError};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -17,22 +17,18 @@ pub(crate) struct Model {
 
 /// Returns how fine an object is converted.
 pub(crate) fn detail(object: &Object, need: &Need, resolution: u32) -> Detail {
-    Detail { tolerance: need.world_tolerance(&object.bounds()), max_resolution: resolution }
+    seam::detail(object, need, resolution)
 }
 
 /// Says why an object is not drawn, if that can be told before converting it.
 pub(crate) fn why_skipped(object: &Object) -> Option<String> {
-    if !object.visible {
-        return Some("it is invisible".to_owned());
-    }
-    if let Some(why) = object.why_undrawable() {
+    if let Some(why) = seam::why_not_drawn(object) {
         return Some(why.to_owned());
     }
     match &*object.shape {
         Shape::Voxels(voxels) if voxels.size().iter().any(|&edge| edge > Grid::LONGEST) => {
             Some(format!("it is longer than {} cells", Grid::LONGEST))
         }
-        Shape::Mesh(mesh) if mesh.triangles.is_empty() => Some("line segments fill no voxels".to_owned()),
         _ => None,
     }
 }
@@ -43,9 +39,9 @@ pub(crate) fn converted(shape: &Shape, bound: f64, what: &str) -> Decision {
         Shape::Volume(_) => {
             Decision::Approximated { why: format!("its surface as {what}; what is translucent is lost") }
         }
-        Shape::Mesh(mesh) if !mesh.segments.is_empty() => Decision::Approximated {
-            why: format!("{what}; {} line segments are left out: they have no area", mesh.segments.len()),
-        },
+        _ if !seam::left_out(shape).is_empty() => {
+            Decision::Approximated { why: format!("{what}; {}", seam::left_out(shape).join("; ")) }
+        }
         _ => Decision::Converted { bound, why: what.to_owned() },
     }
 }

@@ -206,7 +206,7 @@ impl<'a> Painter<'a> {
             return lights;
         }
         for (light, lamp) in lights.iter_mut().zip(&tracer.world.lamps) {
-            let Some(direction) = lamp.direction().filter(|_| lamp.casts_shadow) else { continue };
+            let Some(direction) = lamp.direction().filter(|_| lamp.is_blocked) else { continue };
             let bundle = Bundle { origins: sites, directions: &[direction] };
             *light = tracer.world.reach(&bundle, |grid| &grid.blocking);
         }

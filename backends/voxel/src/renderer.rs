@@ -3,18 +3,19 @@
 use crate::grid::{Chunks, Grid};
 use crate::lamps::Lamp;
 use crate::model::{self, Model};
-use crate::occupancy::{Occupancy, Values};
+use crate::occupancy::Values;
 use crate::paint::{Painter, TILE};
+use crate::plan::plan;
 use crate::trace::{Shadows, Tracer};
 use crate::world::{Counts, Item, World};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
-use polyptych_core::scene::{AlphaMode, CHUNK, Chunk, Object, Scene, Shape, ShapeKind};
+use polyptych_core::scene::{AlphaMode, Scene, ShapeKind};
 use polyptych_core::seam::{
-    BackendFactory, BackendInfo, Control, Counter, Decision, Frame, Need, ObjectPlan, Parameter,
-    ParameterKind, PassPlan, Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Value,
+    BackendFactory, BackendInfo, Control, Counter, Decision, Demand, Frame, Need, Parameter, ParameterKind,
+    Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Surfaces, Value,
 };
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -143,42 +144,7 @@ impl Renderer for Voxel {
     }
 
     fn plan(&self, scene: &Scene, need: &Need) -> Plan {
-        let resolution = self.resolution(need);
-        let mut seen = HashSet::new();
-        let objects: Vec<ObjectPlan> = scene
-            .objects
-            .iter()
-            .map(|object| {
-                let is_new = seen.insert(Arc::as_ptr(&object.shape).addr());
-                plan_object(scene, object, need, resolution, is_new)
-            })
-            .collect();
-        let bytes = objects.iter().map(|o| o.bytes).sum();
-        let casting = scene.all_lights().iter().filter(|l| l.casts_shadow).count();
-        let is_lit = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
-        let shadows = self.shadows(need);
-        let is_shadowed = is_lit && casting > 0 && shadows == Shadows::Hard;
-        let passes = vec![
-            PassPlan {
-                name: "primary rays".to_owned(),
-                needed: true,
-                why: "one through the middle of each pixel".to_owned(),
-            },
-            PassPlan {
-                name: "shadow rays".to_owned(),
-                needed: is_shadowed,
-                why: match (is_lit, casting, shadows) {
-                    (false, _, _) => "neither color nor shadow is asked for".to_owned(),
-                    (_, 0, _) => "no light casts a shadow".to_owned(),
-                    (_, _, Shadows::Off) => "shadows are switched off".to_owned(),
-                    (_, n, Shadows::Hard) => format!("{n} lights cast shadows"),
-                },
-            },
-        ];
-        let rays = f64::from(need.width) * f64::from(need.height);
-        let shadow_rays = if is_shadowed { rays * casting as f64 } else { 0.0 };
-        // A ray takes about 0.1 microseconds on one core; shadow rays leave half of the pixels.
-        Plan { objects, passes, bytes, estimated_ms: (rays + 0.5 * shadow_rays) * 1e-4 }
+        plan(scene, need, self.resolution(need), self.shadows(need))
     }
 
     fn prepare(
@@ -195,7 +161,15 @@ impl Renderer for Voxel {
         self.chunks.end();
         // The lights are those of the scene as given: a shape that was turned into voxels gives off no more light
         // than before.
-        let world = World::new(model.scene, items, Lamp::all(scene));
+        let mut lamps = Lamp::all(scene);
+        // A frame may ask for more channels than were needed: rays toward lights must know their way all the same.
+        let all = Need { channels: need.channels.with(Channel::Color), ..need.clone() };
+        let switch = self.shadows(need) == Shadows::Hard;
+        let demand = Demand::of(&model.scene, &all, &Lamp::lights(&lamps), switch, Surfaces::Stepped);
+        for (lamp, shadow) in lamps.iter_mut().zip(&demand.shadows) {
+            lamp.is_blocked = shadow.is_ok();
+        }
+        let world = World::new(model.scene, items, lamps);
         let bytes = world.bytes() + grid_bytes + self.chunks.bytes();
         let decisions: Arc<[Decision]> = model.decisions.into();
         self.ready = Some(Ready {
@@ -257,32 +231,4 @@ impl Renderer for Voxel {
         ];
         Ok(Report { objects: ready.decisions.clone(), phases, counters, bytes: ready.bytes })
     }
-}
-
-fn plan_object(scene: &Scene, object: &Object, need: &Need, resolution: u32, is_new: bool) -> ObjectPlan {
-    let plan = |decision, builds, bytes| ObjectPlan {
-        name: object.name.clone(),
-        shape: object.shape.kind().name(),
-        decision,
-        builds,
-        bytes,
-    };
-    if let Some(why) = model::why_skipped(object) {
-        return plan(Decision::Skipped { why }, String::new(), 0);
-    }
-    if let Shape::Voxels(voxels) = &*object.shape {
-        let filled = voxels.chunks().iter().filter(|c| !matches!(c, Chunk::Uniform(0))).count();
-        let (builds, bytes) = if is_new {
-            (format!("masks of {filled} chunks"), filled as u64 * size_of::<Occupancy>() as u64)
-        } else {
-            (String::new(), 0)
-        };
-        return plan(Decision::Exact, builds, bytes);
-    }
-    let detail = model::detail(object, need, resolution);
-    let forecast = Converter::default().voxels_forecast(scene, object, detail);
-    let decision = model::converted(&object.shape, forecast.bound, &forecast.builds);
-    // The converter keeps the voxels, for all who ask; what is held here are masks of their chunks.
-    let chunks = forecast.bytes / u64::from(CHUNK).pow(3);
-    plan(decision, forecast.builds, chunks * size_of::<Occupancy>() as u64)
 }

@@ -155,7 +155,7 @@ impl Tracer<'_> {
             if !is_needed {
                 continue;
             }
-            if lamp.casts_shadow && self.shadows == Shadows::Hard {
+            if lamp.is_blocked && self.shadows == Shadows::Hard {
                 self.counts.shadow_rays.set(self.counts.shadow_rays.get() + 1);
                 let ray = Ray { origin: point.lifted, direction: arriving.to_light };
                 let end = lamp.shadow_end(&ray, arriving.distance);

@@ -144,6 +144,15 @@ impl Tree {
     }
 
     /// Returns the bytes held.
+    /// Returns what [`Tree::bytes`] will be for so many boxes: halves down to leaves of [`LEAF`].
+    pub(crate) fn planned_bytes(boxes: usize) -> u64 {
+        fn nodes(boxes: usize) -> usize {
+            if boxes <= LEAF { 1 } else { 1 + nodes(boxes / 2) + nodes(boxes - boxes / 2) }
+        }
+        let nodes = if boxes == 0 { 0 } else { nodes(boxes) };
+        (nodes * size_of::<Node>() + boxes * 4) as u64
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         (self.nodes.len() * size_of::<Node>() + self.order.len() * 4) as u64
     }

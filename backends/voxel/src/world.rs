@@ -201,6 +201,11 @@ impl World {
         Self { scene, tree: Tree::new(&boxes), items, lamps }
     }
 
+    /// Returns what [`World::bytes`] will be for so many objects and lights.
+    pub(crate) fn planned_bytes(objects: usize, lamps: usize) -> u64 {
+        (objects * size_of::<Item>() + lamps * size_of::<Lamp>()) as u64 + Tree::planned_bytes(objects)
+    }
+
     /// Returns the bytes held without what grids hold.
     pub(crate) fn bytes(&self) -> u64 {
         (self.items.len() * size_of::<Item>() + self.lamps.len() * size_of::<Lamp>()) as u64

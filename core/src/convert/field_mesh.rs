@@ -7,8 +7,9 @@
 //! are found by interval bounds instead of an octree of samples, so no sheet thinner than a cell is skipped
 //! before its corners have been looked at.
 
+use super::MeshSize;
 use crate::math::Aabb;
-use crate::parallel::{Threads, for_each_mut};
+use crate::parallel::{OneThread, Threads, for_each_mut};
 use crate::scene::{FreeForm, Mesh, Volume};
 use glam::{DMat3, DVec3, Vec3};
 use std::collections::HashMap;
@@ -84,16 +85,69 @@ pub(super) fn of_form(form: &FreeForm, tolerance: f64, finest: u32, threads: &dy
     }
 }
 
-/// Tells how many triangles [`of_form`] would make, and its bound, from the size alone: the error of a cell `h`
-/// on a sphere of the size of the form is `h^2 / 8r`, and a sphere crosses about 4.7 n^2 cells of two triangles.
-pub(super) fn forecast(form: &FreeForm, tolerance: f64, finest: u32) -> (f64, f64) {
-    let edge = form.bounds().size().max_element();
-    let error = |n: f64| (edge / n).powi(2) / (4.0 * edge) * 1.5;
-    let mut n = 32.0_f64.min(f64::from(finest.max(4)));
-    while error(n) > tolerance && n * 2.0 <= f64::from(finest) {
-        n *= 2.0;
+/// Tells how large a mesh [`of_form`] would make, and its bound. A surface cannot be counted without finding it: it is
+/// found on coarse grids, and goes on from there as it went so far.
+pub(super) fn forecast(form: &FreeForm, tolerance: f64, finest: u32) -> (MeshSize, f64) {
+    /// Finest grid on which it is found.
+    const FOUND: u32 = 64;
+    let form = &form.lowered();
+    let mut resolution = 32.min(finest.max(4));
+    let mut last: Option<(f64, Mesh)> = None;
+    loop {
+        let grid = Grid::around(&form.bounds(), resolution);
+        let mesh = contour(form, &grid, &grid.cells_by_intervals(form, &OneThread), &OneThread);
+        let (worst, most) = deviation(form, &mesh, grid.cell, &OneThread);
+        let before = last.as_ref().map_or(f64::INFINITY, |(worst, _)| *worst);
+        let at_creases = most * 1.5 <= tolerance && worst > 0.35 * before;
+        if worst * 1.5 <= tolerance || at_creases || resolution * 2 > finest {
+            return (size_of_contour(&mesh, 1.0), worst * 1.5);
+        }
+        if resolution >= FOUND {
+            // Four times as many cells, and errors that fall as they fell, for each further halving.
+            let falls = (worst / before).clamp(0.25, 0.5);
+            let (mut bound, mut rest, mut times) = (worst * 1.5, most * 1.5, 1.0);
+            while resolution * 2 <= finest {
+                (bound, rest, times) = (bound * falls, rest * 0.25, times * 4.0);
+                resolution *= 2;
+                if bound <= tolerance || (rest <= tolerance && falls > 0.27) {
+                    break;
+                }
+            }
+            return (size_of_contour(&mesh, times), bound);
+        }
+        last = Some((worst, mesh));
+        resolution *= 2;
     }
-    (4.7 * n * n * 2.0, error(n))
+}
+
+fn size_of_contour(mesh: &Mesh, times: f64) -> MeshSize {
+    let (vertices, triangles) = (mesh.positions.len() as f64 * times, mesh.triangles.len() as f64 * times);
+    MeshSize { vertices, triangles, each: [24.0, 12.0], is_exact: times == 1.0 }
+}
+
+/// Tells how large a mesh [`of_volume`] would make: two triangles for each edge between a sample inside and one outside,
+/// and a vertex for every two triangles, with a color; at creases there are more.
+pub(super) fn forecast_of_volume(volume: &Volume) -> MeshSize {
+    /// Vertices for each edge, from clouds to bones.
+    const VERTICES: f64 = 1.2;
+    let level = volume.transfer.surface_value();
+    let [nx, ny, nz] = volume.size().map(|s| s as usize);
+    let is_inside = |i: usize| volume.samples().get(i) >= level;
+    let mut edges = 0u64;
+    for z in 0..nz {
+        for y in 0..ny {
+            for x in 0..nx {
+                let i = (z * ny + y) * nx + x;
+                let own = is_inside(i);
+                // The last along an axis ends at nothing; so does the first on its other side.
+                let next = [(x + 1 < nx, i + 1), (y + 1 < ny, i + nx), (z + 1 < nz, i + nx * ny)];
+                edges += next.iter().filter(|&&(there, j)| own != (there && is_inside(j))).count() as u64;
+                edges += u64::from(own) * [x, y, z].iter().filter(|&&c| c == 0).count() as u64;
+            }
+        }
+    }
+    let edges = edges as f64;
+    MeshSize { vertices: edges * VERTICES, triangles: edges * 2.0, each: [36.0, 12.0], is_exact: false }
 }
 
 /// Triangulates the surface of a volume at the resolution of its samples; the bound is a cell's diagonal.
@@ -118,11 +172,6 @@ pub(super) fn of_volume(volume: &Volume, threads: &dyn Threads) -> (Mesh, f64) {
         })
         .collect();
     (mesh, volume.spacing().length())
-}
-
-/// Counts the cells that the surface of a volume crosses.
-pub(super) fn count_surface_cells(volume: &Volume) -> usize {
-    surface_cells(volume).len()
 }
 
 /// Lists the cells between samples whose corners lie on both sides of the surface; the grid is one sample

@@ -1,5 +1,6 @@
 //! Which triangles approximate a height field?
 
+use super::MeshSize;
 use crate::scene::{HeightField, Mesh};
 use glam::{Vec2, Vec3};
 
@@ -32,11 +33,11 @@ pub(super) fn triangulate(field: &HeightField, tolerance: f64) -> (Mesh, f64) {
     (mesh, bound)
 }
 
-/// Tells how many triangles [`triangulate`] would make, and its bound.
-pub(super) fn forecast(field: &HeightField, tolerance: f64) -> (f64, f64) {
+/// Tells how large a mesh [`triangulate`] would make, and its bound.
+pub(super) fn forecast(field: &HeightField, tolerance: f64) -> (MeshSize, f64) {
     let (stride, bound) = choose_stride(field, tolerance);
-    let cells = |samples: u32| (kept(samples, stride).len() - 1) as f64;
-    (cells(field.columns()) * cells(field.rows()) * 2.0, bound)
+    let [columns, rows] = [field.columns(), field.rows()].map(|samples| kept(samples, stride).len() as u32);
+    (MeshSize::exact(columns * rows, (columns - 1) * (rows - 1) * 2), bound)
 }
 
 fn choose_stride(field: &HeightField, tolerance: f64) -> (u32, f64) {

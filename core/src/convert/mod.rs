@@ -1,8 +1,9 @@
 //! Turns any shape into triangles, voxels or a signed-distance grid: on demand, to a stated tolerance, once
 //! for all back ends, and with the error bound that was reached.
 //!
-//! Nothing is converted that no one asked for. Tolerances are grouped in classes half an octave wide; a
-//! result is kept under (shape, class) as long as the shape lives, and shared by all who ask again.
+//! Nothing is converted that no one asked for. Tolerances are grouped in classes half an octave wide, as shares of
+//! the body's size, so that a scene in other units becomes the same picture; a result is kept under (shape, class)
+//! as long as the shape lives, and shared by all who ask again.
 
 mod distance;
 mod field_mesh;
@@ -12,6 +13,7 @@ mod primitive_mesh;
 mod voxel_mesh;
 mod voxelize;
 
+use crate::math::Aabb;
 use crate::parallel::Threads;
 use crate::scene::{Material, Mesh, Object, Scene, Shape, Voxels};
 use glam::{DAffine3, DVec3};
@@ -35,6 +37,39 @@ pub struct Forecast {
     pub bound: f64,
     /// What would be built, for people: `"about 12,000 triangles"`.
     pub builds: String,
+    /// Triangles; 0 for what is none.
+    pub triangles: u64,
+    /// Corners of them that are kept apart.
+    pub vertices: u64,
+}
+
+impl Forecast {
+    fn of_grid(bytes: u64, bound: f64, builds: String) -> Self {
+        Self { bytes, bound, builds, triangles: 0, vertices: 0 }
+    }
+}
+
+/// How large a mesh is or would be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct MeshSize {
+    vertices: f64,
+    triangles: f64,
+    /// Bytes of a vertex and of a triangle.
+    each: [f64; 2],
+    /// Whether the numbers are those that come out, and no estimate.
+    is_exact: bool,
+}
+
+impl MeshSize {
+    /// The size of a mesh whose vertices have normals and texture coordinates.
+    fn exact(vertices: u32, triangles: u32) -> Self {
+        Self {
+            vertices: f64::from(vertices),
+            triangles: f64::from(triangles),
+            each: [32.0, 12.0],
+            is_exact: true,
+        }
+    }
 }
 
 /// A shape as triangles, in its object space; slots are the object's.
@@ -109,7 +144,31 @@ pub struct Detail {
     pub max_resolution: u32,
 }
 
+impl Detail {
+    /// Returns the class of the tolerance for an object, rounded down: half octaves of its share of the body's size.
+    /// What is converted is the same for all tolerances of a class.
+    #[must_use]
+    pub fn class(&self, object: &Object) -> i32 {
+        let share = self.tolerance / (scale_of(object) * extent_of(object));
+        if share > 0.0 && share.is_finite() { (share.log2() * 2.0 + 1e-9).floor() as i32 } else { i32::MIN }
+    }
+
+    /// Returns the tolerance of the class in object space.
+    fn in_object(&self, object: &Object) -> f64 {
+        match self.class(object) {
+            i32::MIN => 0.0,
+            class => 2f64.powf(f64::from(class) * 0.5) * extent_of(object),
+        }
+    }
+}
+
 impl Converter {
+    /// Counts the conversions at hand: meshes, voxels, grids of distances. What nobody asked for is none.
+    #[must_use]
+    pub fn kept(&self) -> [usize; 3] {
+        [self.meshes.count(), self.voxels.count(), self.distances.count()]
+    }
+
     /// Returns the shape of an object as triangles. Meshes are returned as they are.
     ///
     /// # Errors
@@ -122,8 +181,7 @@ impl Converter {
         threads: &dyn Threads,
     ) -> Result<Arc<MeshModel>, ConvertError> {
         let scale = scale_of(object);
-        self.meshes.get(scene, object, detail, |detail| {
-            let tolerance = detail.tolerance / scale;
+        self.meshes.get(scene, object, detail, |tolerance| {
             let (mesh, bound, why) = match &*object.shape {
                 Shape::Mesh(mesh) => (mesh.clone(), 0.0, "triangles as given".to_owned()),
                 Shape::Primitive(primitive) => {
@@ -174,8 +232,7 @@ impl Converter {
         threads: &dyn Threads,
     ) -> Result<Arc<VoxelModel>, ConvertError> {
         let scale = scale_of(object);
-        self.voxels.get(scene, object, detail, |detail| {
-            let tolerance = detail.tolerance / scale;
+        self.voxels.get(scene, object, detail, |tolerance| {
             let mut model = voxelize::voxelize(scene, object, tolerance, detail.max_resolution, threads)
                 .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
             model.bound *= scale;
@@ -198,8 +255,7 @@ impl Converter {
         let scale = scale_of(object);
         let half = Detail { tolerance: detail.tolerance * 0.5, ..detail };
         let surface = self.mesh(scene, object, half, threads)?;
-        self.distances.get(scene, object, detail, |detail| {
-            let tolerance = detail.tolerance / scale;
+        self.distances.get(scene, object, detail, |tolerance| {
             let mut model =
                 distance::of_mesh(scene, object, &surface.mesh, tolerance, detail.max_resolution, threads)
                     .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
@@ -212,42 +268,56 @@ impl Converter {
     #[must_use]
     pub fn mesh_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
         if let Some(model) = self.meshes.find(scene, object, detail) {
-            return Forecast { bytes: model.mesh.bytes(), bound: model.bound, builds: model.why.clone() };
+            let mesh = &model.mesh;
+            return Forecast {
+                bytes: mesh.bytes(),
+                bound: model.bound,
+                builds: model.why.clone(),
+                triangles: mesh.triangles.len() as u64,
+                vertices: mesh.positions.len() as u64,
+            };
         }
         let scale = scale_of(object);
-        let tolerance = class_tolerance(detail.tolerance) / scale;
-        let (triangles, bound) = match &*object.shape {
-            Shape::Mesh(mesh) => (mesh.triangles.len() as f64, 0.0),
-            Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
-            Shape::Voxels(voxels) => {
-                (voxel_mesh::count_faces(voxels, &clear_values(scene, object)) as f64 * 2.0, 0.0)
+        let tolerance = detail.in_object(object);
+        let (size, bound) = match &*object.shape {
+            Shape::Mesh(mesh) => {
+                let (vertices, triangles) = (mesh.positions.len() as f64, mesh.triangles.len() as f64);
+                (MeshSize { vertices, triangles, is_exact: true, ..MeshSize::default() }, 0.0)
             }
+            Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
+            Shape::Voxels(voxels) => (voxel_mesh::forecast(voxels, &clear_values(scene, object)), 0.0),
             Shape::FreeForm(form) => {
                 field_mesh::forecast(form, tolerance, detail.max_resolution.min(field_mesh::FINEST))
             }
             Shape::HeightField(field) => height_mesh::forecast(field, tolerance),
-            Shape::Volume(volume) => {
-                (field_mesh::count_surface_cells(volume) as f64 * 2.0, volume.spacing().length())
-            }
+            Shape::Volume(volume) => (field_mesh::forecast_of_volume(volume), volume.spacing().length()),
         };
-        // About one vertex with position, normal and texture coordinates for two triangles.
-        let bytes = (triangles * (12.0 + 0.55 * 32.0)) as u64;
-        Forecast { bytes, bound: bound * scale, builds: format!("about {triangles:.0} triangles") }
+        let bytes = size.vertices * size.each[0] + size.triangles * size.each[1];
+        Forecast {
+            bytes: bytes as u64,
+            bound: bound * scale,
+            builds: format!("{}{:.0} triangles", if size.is_exact { "" } else { "about " }, size.triangles),
+            triangles: size.triangles as u64,
+            vertices: size.vertices as u64,
+        }
     }
 
     /// Tells what [`Converter::voxels`] would make.
     #[must_use]
     pub fn voxels_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
         if let Some(model) = self.voxels.find(scene, object, detail) {
-            return Forecast { bytes: model.voxels.bytes(), bound: model.bound, builds: model.why.clone() };
+            return Forecast::of_grid(model.voxels.bytes(), model.bound, model.why.clone());
         }
         let scale = scale_of(object);
-        let tolerance = class_tolerance(detail.tolerance) / scale;
+        let tolerance = detail.in_object(object);
         let (size, cell) = voxelize::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
-        let chunks = size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>();
+        let chunks = match &*object.shape {
+            Shape::FreeForm(form) => voxelize::chunks_of_form(form, size, cell),
+            _ => size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>(),
+        };
         let bytes = chunks * u64::from(crate::scene::CHUNK).pow(3);
         let [x, y, z] = size;
-        Forecast { bytes, bound: cell * 3f64.sqrt() * scale, builds: format!("{x}x{y}x{z} voxels") }
+        Forecast::of_grid(bytes, cell * 3f64.sqrt() * scale, format!("{x}x{y}x{z} voxels"))
     }
 
     /// Tells what [`Converter::distance`] would make.
@@ -255,18 +325,19 @@ impl Converter {
     pub fn distance_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
         if let Some(model) = self.distances.find(scene, object, detail) {
             let bytes = model.distances.len() as u64 * 5;
-            return Forecast { bytes, bound: model.bound, builds: model.why.clone() };
+            return Forecast::of_grid(bytes, model.bound, model.why.clone());
         }
         let scale = scale_of(object);
-        let tolerance = class_tolerance(detail.tolerance) / scale;
-        let (size, step) = distance::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
+        let tolerance = detail.in_object(object);
+        // The grid lies around the triangles that it is made of: cells that are empty have none.
+        let bounds = match &*object.shape {
+            Shape::Voxels(voxels) => filled_bounds(voxels),
+            shape => shape.bounds(),
+        };
+        let (size, step) = distance::grid_size(&bounds, tolerance, detail.max_resolution);
         let bytes = size.iter().map(|&s| u64::from(s)).product::<u64>() * 5;
         let [x, y, z] = size;
-        Forecast {
-            bytes,
-            bound: distance::bound(step) * scale,
-            builds: format!("{x}x{y}x{z} signed distances"),
-        }
+        Forecast::of_grid(bytes, distance::bound(step) * scale, format!("{x}x{y}x{z} signed distances"))
     }
 }
 
@@ -284,25 +355,25 @@ fn scale_of(object: &Object) -> f64 {
     if scale > 0.0 && scale.is_finite() { scale } else { 1.0 }
 }
 
+/// Returns the size of an object's shape, in object space: 1 where it has none.
+fn extent_of(object: &Object) -> f64 {
+    let size = object.shape.bounds().radius();
+    if size > 0.0 && size.is_finite() { size } else { 1.0 }
+}
+
+/// Returns the box around the cells that hold something.
+fn filled_bounds(voxels: &Voxels) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
+    voxels.for_each_filled(|cell, _| {
+        let low = DVec3::from_array(cell.map(f64::from));
+        bounds = bounds.with(low).with(low + 1.0);
+    });
+    bounds
+}
+
 /// Tells for each palette byte whether light passes through.
 fn clear_values(scene: &Scene, object: &Object) -> [bool; 256] {
     std::array::from_fn(|v| v == 0 || scene.material(object, v - 1).is_see_through())
-}
-
-/// Rounds a tolerance down to its class: powers of the square root of two.
-fn class_of(tolerance: f64) -> i32 {
-    if tolerance > 0.0 && tolerance.is_finite() {
-        (tolerance.log2() * 2.0 + 1e-9).floor() as i32
-    } else {
-        i32::MIN
-    }
-}
-
-fn class_tolerance(tolerance: f64) -> f64 {
-    match class_of(tolerance) {
-        i32::MIN => 0.0,
-        class => 2f64.powf(f64::from(class) * 0.5),
-    }
 }
 
 /// Results by shape, class and the materials that went into them.
@@ -329,7 +400,12 @@ impl<T> Default for Cache<T> {
 
 impl<T> Cache<T> {
     fn key(object: &Object, detail: Detail) -> Key {
-        (Arc::as_ptr(&object.shape) as usize, class_of(detail.tolerance), detail.max_resolution)
+        (Arc::as_ptr(&object.shape) as usize, detail.class(object), detail.max_resolution)
+    }
+
+    fn count(&self) -> usize {
+        let entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
+        entries.values().map(Vec::len).sum()
     }
 
     fn find(&self, scene: &Scene, object: &Object, detail: Detail) -> Option<Arc<T>> {
@@ -347,7 +423,7 @@ impl<T> Cache<T> {
         scene: &Scene,
         object: &Object,
         detail: Detail,
-        make: impl FnOnce(Detail) -> Result<T, ConvertError>,
+        make: impl FnOnce(f64) -> Result<T, ConvertError>,
     ) -> Result<Arc<T>, ConvertError> {
         if let Some(model) = self.find(scene, object, detail) {
             return Ok(model);
@@ -355,7 +431,7 @@ impl<T> Cache<T> {
         if let Some(reason) = object.why_undrawable() {
             return Err(ConvertError { object: object.name.clone(), reason: reason.to_owned() });
         }
-        let model = Arc::new(make(Detail { tolerance: class_tolerance(detail.tolerance), ..detail })?);
+        let model = Arc::new(make(detail.in_object(object))?);
         let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
         entries.retain(|_, list| {
             list.retain(|e| e.shape.strong_count() > 0);
@@ -407,6 +483,50 @@ mod tests {
     }
 
     #[test]
+    fn forecasts_are_what_is_made_then() {
+        let scene = Scene::default();
+        let heights = (0..24 * 17).map(|i| (f64::from(i % 24) * 0.4).sin() as f32).collect();
+        let form = |center: f64| crate::scene::Form::Ellipsoid {
+            center: DVec3::X * center,
+            radii: DVec3::new(1.0, 0.7, 0.8),
+        };
+        let union = crate::scene::Form::Union(vec![form(0.0), form(0.9)]);
+        let ball = |x: u32, y: u32, z: u32| {
+            let p = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) - 11.5;
+            u8::from(p.length() < 11.0)
+        };
+        // Share by which bytes may be off: what has a formula is exact, what must be found on a grid is not.
+        let shapes: Vec<(Shape, f64)> = vec![
+            (Shape::Primitive(Primitive::Sphere { radius: 1.0 }), 0.0),
+            (Shape::Primitive(Primitive::Torus { major: 1.0, minor: 0.3 }), 0.0),
+            (Shape::Primitive(Primitive::Cylinder { radius: 1.0, height: 2.0 }), 0.0),
+            (Shape::Primitive(Primitive::Cone { radius: 1.0, height: 2.0 }), 0.0),
+            (Shape::Primitive(Primitive::Box { size: DVec3::ONE }), 0.0),
+            (Shape::Primitive(Primitive::Plane { width: 1.0, depth: 2.0 }), 0.0),
+            (Shape::Primitive(Primitive::prism(7, 1.0, 2.0)), 0.0),
+            (Shape::Primitive(Primitive::pyramid(5, 1.0, 2.0)), 0.0),
+            (
+                Shape::HeightField(
+                    crate::scene::HeightField::new(24, 17, glam::DVec2::ONE, heights).unwrap(),
+                ),
+                0.0,
+            ),
+            (Shape::Voxels(Voxels::from_fn([24; 3], ball)), 0.02),
+            (Shape::FreeForm(crate::scene::FreeForm::new(union).unwrap()), 0.1),
+        ];
+        for (shape, slack) in shapes {
+            let object = Object::new("thing", shape, 0);
+            for tolerance in [0.05, 0.004] {
+                let detail = Detail { tolerance, max_resolution: 256 };
+                let planned = Converter::default().mesh_forecast(&scene, &object, detail);
+                let made = Converter::default().mesh(&scene, &object, detail, &OneThread).unwrap();
+                let off = planned.bytes as f64 / made.mesh.bytes() as f64 - 1.0;
+                assert!(off.abs() <= slack, "{:?} at {tolerance}: {off}", object.shape.kind());
+            }
+        }
+    }
+
+    #[test]
     fn tolerance_is_meant_in_world_space() {
         let (scene, mut object) = ball();
         let converter = Converter::default();
@@ -416,6 +536,24 @@ mod tests {
         let large = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
         assert!(large.bound <= 0.01, "{}", large.bound);
         assert!(large.mesh.triangles.len() > 20 * small.mesh.triangles.len());
+    }
+
+    #[test]
+    fn the_same_body_in_other_units_becomes_the_same_triangles() {
+        let (scene, object) = ball();
+        let converter = Converter::default();
+        let triangles = |unit: f64| {
+            let mut object = object.clone();
+            object.world_from_object = DAffine3::from_scale(DVec3::splat(unit));
+            let detail = Detail { tolerance: 0.0123 * unit, max_resolution: 64 };
+            let model = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+            assert!(model.bound <= 0.0123 * unit);
+            model.mesh.positions.clone()
+        };
+        let meters = triangles(1.0);
+        for power in -12..=12 {
+            assert!(triangles(10f64.powi(power)) == meters, "10^{power}");
+        }
     }
 
     #[test]

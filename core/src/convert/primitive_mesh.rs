@@ -1,11 +1,15 @@
 //! Which triangles approximate a parametric body?
 
+use super::MeshSize;
 use crate::scene::{Mesh, Primitive};
 use glam::{DVec2, DVec3, Vec2};
 use std::f64::consts::{PI, TAU};
 
 /// Most steps around a circle: an error of 5e-7 of the radius.
 const MOST_STEPS: u32 = 2048;
+
+/// Rows of rings of a cone.
+const CONE_ROWS: u32 = 8;
 
 /// Tessellates a body; returns the greatest distance from its surface. Polyhedra are exact.
 pub(super) fn tessellate(primitive: &Primitive, tolerance: f64) -> (Mesh, f64) {
@@ -51,7 +55,7 @@ pub(super) fn tessellate(primitive: &Primitive, tolerance: f64) -> (Mesh, f64) {
             let half = height * 0.5;
             let normal = DVec2::new(height, radius).normalize_or(DVec2::X);
             // Rows of rings keep the interpolated normals and textures of the long triangles right.
-            let rows = 8;
+            let rows = CONE_ROWS;
             let profile: Vec<_> = (0..=rows)
                 .map(|i| {
                     let v = f64::from(i) / f64::from(rows);
@@ -80,18 +84,44 @@ pub(super) fn tessellate(primitive: &Primitive, tolerance: f64) -> (Mesh, f64) {
     (mesh, bound)
 }
 
-/// Tells how many triangles [`tessellate`] would make, and its bound.
-pub(super) fn forecast(primitive: &Primitive, tolerance: f64) -> (f64, f64) {
-    let n = |radius: f64, tolerance: f64| f64::from(circle_steps(radius, tolerance));
+/// Tells how large a mesh [`tessellate`] would make, and its bound.
+pub(super) fn forecast(primitive: &Primitive, tolerance: f64) -> (MeshSize, f64) {
+    // A profile of so many points turned around the axis: each row of a step has two triangles, but one at a tip.
+    let revolved =
+        |points: u32, steps: u32, tips: u32| [points * (steps + 1), steps * (2 * (points - 1) - tips)];
+    let disk = |corners: u32| [corners, corners - 2];
+    let sum = |parts: &[[u32; 2]]| {
+        let total = |k: usize| parts.iter().map(|p| p[k]).sum();
+        MeshSize::exact(total(0), total(1))
+    };
     match *primitive {
-        Primitive::Box { .. } => (12.0, 0.0),
-        Primitive::Plane { .. } => (2.0, 0.0),
-        Primitive::Frustum { sides, .. } => (f64::from(sides) * 4.0 - 4.0, 0.0),
-        Primitive::Sphere { radius } => (n(radius, tolerance * 0.5).powi(2), tolerance),
-        Primitive::Cylinder { radius, .. } => (n(radius, tolerance) * 4.0, tolerance),
-        Primitive::Cone { radius, .. } => (n(radius, tolerance) * 17.0, tolerance),
+        Primitive::Box { .. } => (MeshSize::exact(24, 12), 0.0),
+        Primitive::Plane { .. } => (MeshSize::exact(4, 2), 0.0),
+        Primitive::Frustum { sides, lower_radius, upper_radius, .. } => {
+            let (quads, caps) = match (lower_radius > 0.0, upper_radius > 0.0) {
+                (true, true) => ([4, 2], 2),
+                _ => ([3, 1], 1),
+            };
+            let walls = quads.map(|n| n * sides);
+            (sum(&[walls, disk(sides).map(|n| n * caps)]), 0.0)
+        }
+        Primitive::Sphere { radius } => {
+            let steps = circle_steps(radius, tolerance * 0.5);
+            let rings = steps.div_ceil(2).max(2);
+            (sum(&[revolved(rings + 1, steps, 2)]), sagitta(radius, steps) + sagitta(radius, rings * 2))
+        }
+        Primitive::Cylinder { radius, .. } => {
+            let steps = circle_steps(radius, tolerance);
+            (sum(&[revolved(2, steps, 0), disk(steps), disk(steps)]), sagitta(radius, steps))
+        }
+        Primitive::Cone { radius, .. } => {
+            let steps = circle_steps(radius, tolerance);
+            (sum(&[revolved(CONE_ROWS + 1, steps, 1), disk(steps)]), sagitta(radius, steps))
+        }
         Primitive::Torus { major, minor } => {
-            (n(major + minor, tolerance * 0.5) * n(minor, tolerance * 0.5) * 2.0, tolerance)
+            let steps = circle_steps(major + minor, tolerance * 0.5);
+            let tube = circle_steps(minor, tolerance * 0.5);
+            (sum(&[revolved(tube + 1, steps, 0)]), sagitta(major + minor, steps) + sagitta(minor, tube))
         }
     }
 }

@@ -23,6 +23,28 @@ pub(super) fn grid_size(bounds: &Aabb, tolerance: f64, max_resolution: u32) -> (
     (size, cell)
 }
 
+/// Counts the chunks of a form's grid that can hold anything: its bounds are wider than the form.
+pub(super) fn chunks_of_form(form: &FreeForm, size: [u32; 3], cell: f64) -> u64 {
+    const CHUNK: u32 = crate::scene::CHUNK;
+    let covered = DVec3::from_array(size.map(f64::from)) * cell;
+    let first = form.bounds().center() - covered * 0.5;
+    // In small parts: intervals are wide over much space.
+    let part = CHUNK / 16;
+    let corner = |at: [u32; 3]| first + DVec3::from_array(at.map(f64::from)) * cell;
+    let holds = |low: [u32; 3]| {
+        (0..4096u32).any(|i| {
+            let from: [u32; 3] = std::array::from_fn(|a| low[a] + (i >> (4 * a) & 15) * part);
+            let to: [u32; 3] = std::array::from_fn(|a| (from[a] + part).min(size[a]));
+            (0..3).all(|a| from[a] < size[a])
+                && form.form().interval(&Aabb::new(corner(from), corner(to))).hi >= 0.0
+        })
+    };
+    let count = size.map(|s| s.div_ceil(CHUNK));
+    let chunks = (0..count.iter().product())
+        .map(|i| [i % count[0], i / count[0] % count[1], i / (count[0] * count[1])].map(|c: u32| c * CHUNK));
+    chunks.filter(|&low| holds(low)).count() as u64
+}
+
 pub(super) fn voxelize(
     scene: &Scene,
     object: &Object,

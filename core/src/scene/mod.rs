@@ -18,6 +18,8 @@ pub use light::{Arriving, Light, LightKind};
 pub use material::{AlphaMode, Mapping, Material, color_text};
 pub use mesh::Mesh;
 pub use primitive::Primitive;
+#[cfg(debug_assertions)]
+pub use texture::texture_lookups;
 pub use texture::{Texture, TextureWrap};
 pub use volume::{Samples, TransferFunction, TransferPoint, Volume};
 pub use voxels::{CHUNK, Chunk, Voxels};

@@ -37,6 +37,18 @@ struct Level {
     texels: Vec<[u16; 4]>,
 }
 
+/// How often textures were read, all together.
+#[cfg(debug_assertions)]
+static LOOKUPS: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
+
+/// Returns how often textures were read in this process, so that tests can tell what a picture read. Only builds with
+/// debug assertions count: a frame of others pays nothing.
+#[cfg(debug_assertions)]
+#[must_use]
+pub fn texture_lookups() -> u64 {
+    LOOKUPS.load(std::sync::atomic::Ordering::Relaxed)
+}
+
 /// Linear light in `[0, 1]` is stored in 16 bits, so that dark sRGB steps stay apart.
 const FULL: f32 = 65535.0;
 
@@ -103,6 +115,8 @@ impl Texture {
     /// Coordinates that are not finite read as 0. Returns linear RGBA in `[0, 1]`.
     #[must_use]
     pub fn sample(&self, uv: [f32; 2], lod: f32) -> Vec4 {
+        #[cfg(debug_assertions)]
+        LOOKUPS.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         let uv = uv.map(|c| if c.is_finite() { c } else { 0.0 });
         let last = (self.levels.len() - 1) as f32;
         let lod = if lod > 0.0 { lod.min(last) } else { 0.0 };

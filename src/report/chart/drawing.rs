@@ -60,17 +60,25 @@ pub fn svg(chart: &Chart, measure: Measure) -> String {
     document(WIDTH, height, "Error against time of a frame, back end by back end", &body)
 }
 
+/// Says how many threads there were and whether they stayed where they were.
+pub(super) fn threads_text(chart: &Chart) -> String {
+    match (chart.threads, chart.pinned) {
+        (1, true) => "1 thread on a core of its own".to_owned(),
+        (n, true) => format!("{n} threads on cores of their own"),
+        (n, false) => format!("{n} thread{} that wander from core to core", if n == 1 { "" } else { "s" }),
+    }
+}
+
 /// Writes the title, what was measured where, and the legend.
 fn heading(chart: &Chart) -> String {
     let mut body = format!(
         "<text x=\"16\" y=\"24\" style=\"font-size:18px;font-weight:650\">Error against time: lower and further left is better</text>\
          <text class=\"soft\" x=\"16\" y=\"43\">{}</text>",
         escape(&format!(
-            "{}x{} pixels, {} thread{}, {}, {}",
+            "{}x{} pixels, {}, {}, {}",
             chart.width,
             chart.height,
-            chart.threads,
-            if chart.threads == 1 { "" } else { "s" },
+            threads_text(chart),
             machine(),
             today()
         ))

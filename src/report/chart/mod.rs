@@ -9,7 +9,7 @@ use crate::chart::{Chart, Measure, Point, TOLERANCE, best_within, fastest_under,
 use crate::picture::{PictureError, write_whole};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use drawing::{color_of, growth_svg};
+use drawing::{color_of, growth_svg, threads_text};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -60,7 +60,7 @@ pub fn numbers(chart: &Chart) -> Value {
         })
         .collect();
     json!({
-        "machine": machine(), "date": today(), "threads": chart.threads, "width": chart.width,
+        "machine": machine(), "date": today(), "threads": chart.threads, "pinned": chart.pinned, "width": chart.width,
         "height": chart.height, "scenes": chart.scenes, "ruler_samples": chart.ruler_samples,
         "points": points, "axes": chart.walks, "growth": chart.growth,
         "equal_time": equal_time(chart), "equal_error": equal_error(chart),
@@ -193,6 +193,12 @@ fn page(chart: &Chart, command: &str) -> String {
     let mut data = numbers(chart);
     let url = |bytes: &[u8]| format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes));
     data["command"] = json!(command);
+    let spread = if chart.pinned {
+        ""
+    } else {
+        ": this system does not keep them on a core, or has fewer cores, so that times spread more"
+    };
+    data["threads_text"] = json!(format!("{}{spread}", threads_text(chart)));
     data["backends"] = json!(chart.backends);
     data["colors"] = (0..chart.backends.len()).map(|i| color_of(chart, i)).collect();
     data["rulers"] = chart.rulers.iter().map(|r| url(r)).collect();

@@ -10,15 +10,17 @@ const HEAD: &str = "# Limits: where each method breaks
 
 Written by `polyptych stability`; do not edit. One parameter is swept in each case, easy values first, in pictures of
 96 x 72 pixels. A method *breaks* at the first value at which its error passes the limit; \"never\" means not within the
-values that were tried. Where a better way is known, it is told with its price: the time of a frame against the plain
-way's at the same value. The command beside each line draws that value again and tells its worst pixel;
-`--pixel X,Y` tells about any other. `polyptych stability --check LIMITS.md` fails where something breaks earlier than here.
+values that were tried, the last of which stands in the command. Where a better way is known, it is told with its price:
+the time of a frame against the plain way's at the same value. The command beside each line draws that value again and
+tells its worst pixel; `--pixel X,Y` tells about any other. `polyptych stability --check LIMITS.md` fails where something
+breaks earlier than here.
 ";
 
 /// Writes LIMITS.md.
 #[must_use]
 pub fn limits(cases: &[Case], outcomes: &[Outcome]) -> String {
     let mut text = format!("{HEAD}\nMeasured on {}, {}.\n", machine(), today());
+    text.push_str(&in_short(cases, outcomes));
     for case in cases {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.case == case.id).collect();
         let (Some(first), Some(last)) = (case.values.first(), case.values.last()) else { continue };
@@ -57,6 +59,26 @@ pub fn limits(cases: &[Case], outcomes: &[Outcome]) -> String {
         }
     }
     text
+}
+
+/// Lists what breaks, a line for each case, and names the cases that nothing breaks.
+fn in_short(cases: &[Case], outcomes: &[Outcome]) -> String {
+    let (mut broken, mut whole) = (String::new(), Vec::new());
+    for case in cases {
+        let own = || outcomes.iter().filter(|o| o.case == case.id && o.method.is_none());
+        let places: Vec<String> = own()
+            .filter(|o| o.breaks_at.is_some())
+            .map(|o| format!("{} at {}", o.backend, breaks(o)))
+            .collect();
+        match (places.is_empty(), own().next()) {
+            (true, Some(_)) => whole.push(case.id),
+            (true, None) => {}
+            (false, _) => {
+                let _ = writeln!(broken, "- {} ({}): {}", case.id, case.parameter, places.join(", "));
+            }
+        }
+    }
+    format!("\n## In short\n\n{broken}\nNothing breaks: {}.\n", whole.join(", "))
 }
 
 /// Says what a better way costs: its time over the plain way's at the last value that both drew.
@@ -142,6 +164,7 @@ mod tests {
             limit: 0.01,
             passed: true,
             failure: None,
+            is_cut_short: false,
             pictures: Vec::new(),
         }
     }

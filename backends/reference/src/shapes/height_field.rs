@@ -52,6 +52,18 @@ impl Blocks {
         Self { levels }
     }
 
+    /// Returns what [`Blocks::bytes`] will be.
+    pub(crate) fn planned_bytes(field: &HeightField) -> u64 {
+        let blocks = |samples: u32| u64::from((samples - 1).div_ceil(BLOCK));
+        let (mut columns, mut rows) = (blocks(field.columns()), blocks(field.rows()));
+        let mut ranges = columns * rows;
+        while columns * rows > 1 {
+            (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
+            ranges += columns * rows;
+        }
+        ranges * 8
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         self.levels.iter().map(|l| l.ranges.len() as u64 * 8).sum()
     }

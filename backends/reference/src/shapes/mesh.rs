@@ -10,6 +10,9 @@ use glam::{DVec3, Vec3};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::Mesh;
 
+/// Most triangles in a leaf.
+const LEAF: usize = 4;
+
 /// The triangles of a mesh in a tree; triangles with a corner that is not finite are left out.
 #[derive(Debug)]
 pub(crate) struct MeshTree {
@@ -22,9 +25,14 @@ impl MeshTree {
     pub(crate) fn new(mesh: &Mesh) -> Self {
         let finite = (0..mesh.triangles.len()).filter(|&t| mesh.corners(t).iter().all(|c| c.is_finite()));
         let bounds = |t: usize| Aabb::of_points(mesh.corners(t).map(Vec3::as_dvec3));
-        let tree = Bvh::build(finite.map(|t| Bounded::new(&bounds(t), t)).collect(), 4);
+        let tree = Bvh::build(finite.map(|t| Bounded::new(&bounds(t), t)).collect(), LEAF);
         let corners = tree.order().iter().map(|&t| mesh.corners(t as usize)).collect();
         Self { tree, corners }
+    }
+
+    /// Foretells [`MeshTree::bytes`].
+    pub(crate) fn planned_bytes(mesh: &Mesh) -> u64 {
+        Bvh::planned_bytes(mesh.triangles.len(), LEAF) + mesh.triangles.len() as u64 * 36
     }
 
     pub(crate) fn bytes(&self) -> u64 {

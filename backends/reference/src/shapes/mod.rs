@@ -65,10 +65,9 @@ impl Geometry {
     /// Estimates the bytes of [`Geometry::new`] without building it.
     pub(crate) fn estimated_bytes(shape: &Shape) -> u64 {
         match shape {
-            // A leaf holds three boxes on the mean: two thirds of a node a triangle, corners and numbers.
-            Shape::Mesh(mesh) => mesh.triangles.len() as u64 * 64,
-            Shape::HeightField(field) => field.heights().len() as u64 * 8 / 12,
-            Shape::Volume(volume) => volume.samples().len() as u64 / 512,
+            Shape::Mesh(mesh) => MeshTree::planned_bytes(mesh),
+            Shape::HeightField(field) => Blocks::planned_bytes(field),
+            Shape::Volume(volume) => EmptyBlocks::planned_bytes(volume),
             Shape::Primitive(body) => body.faces().len() as u64 * 32,
             Shape::FreeForm(form) => form.form().node_count() as u64 * size_of::<function::Function>() as u64,
             Shape::Voxels(_) => 0,

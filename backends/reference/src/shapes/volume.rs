@@ -30,6 +30,11 @@ impl EmptyBlocks {
         Self { blocks, empty }
     }
 
+    /// Returns what [`EmptyBlocks::bytes`] will be.
+    pub(crate) fn planned_bytes(volume: &Volume) -> u64 {
+        volume.size().map(|s| u64::from(s.div_ceil(BLOCK as u32))).iter().product()
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         self.empty.len() as u64
     }

@@ -1,5 +1,11 @@
 //! Which cases are there?
 
+mod forms;
+mod lines;
+mod loads;
+mod surfaces;
+mod voxels;
+
 use super::count::Count;
 use super::{Case, scenes};
 
@@ -14,11 +20,6 @@ fn powers(from: i32, to: i32) -> Vec<f64> {
     (0..=(to - from).abs()).map(|i| 10f64.powi(from + step * i)).collect()
 }
 
-/// Powers of eight from 1 on: conversions have classes of half octaves, and stay the same at such scales.
-fn eighths(to: i32) -> Vec<f64> {
-    (0..=to.abs()).map(|i| 8f64.powi(i * to.signum())).collect()
-}
-
 /// Returns all cases.
 #[must_use]
 pub fn cases() -> Vec<Case> {
@@ -26,7 +27,11 @@ pub fn cases() -> Vec<Case> {
     all.extend(surfaces());
     all.extend(shadows_and_views());
     all.extend(shapes());
-    all.extend(loads());
+    all.extend(surfaces::cases());
+    all.extend(voxels::cases());
+    all.extend(forms::cases());
+    all.extend(lines::cases());
+    all.extend(loads::cases());
     all
 }
 
@@ -80,7 +85,7 @@ fn distances() -> Vec<Case> {
             id: "tiny-scenes",
             title: "The same still life, smaller and smaller",
             parameter: "scale",
-            values: eighths(-9),
+            values: powers(0, -8),
             limit: 0.002,
             counted: "color difference to the picture at scale 1",
             backends: EVERY,
@@ -92,7 +97,7 @@ fn distances() -> Vec<Case> {
             id: "huge-scenes",
             title: "The same still life, larger and larger",
             parameter: "scale",
-            values: eighths(9),
+            values: powers(0, 8),
             limit: 0.002,
             counted: "color difference to the picture at scale 1",
             backends: EVERY,
@@ -357,44 +362,5 @@ fn shapes() -> Vec<Case> {
             count: Count::Distance,
             ..base()
         },
-    ]
-}
-
-/// Times: they depend on the machine and what else it does, and are no promise.
-fn loads() -> Vec<Case> {
-    let growth = |id, title, parameter, values, build| Case {
-        id,
-        title,
-        parameter,
-        values,
-        limit: 2.0,
-        counted: "growth of the time over the growth of the load",
-        backends: EVERY,
-        build,
-        count: Count::Growth,
-        ..base()
-    };
-    vec![
-        growth(
-            "load-objects",
-            "Boxes in a field, more and more",
-            "objects",
-            vec![1.0, 10.0, 100.0, 1000.0, 5000.0],
-            scenes::many,
-        ),
-        growth(
-            "load-lights",
-            "A still life under more and more lights",
-            "lights",
-            vec![1.0, 4.0, 16.0, 64.0],
-            scenes::lights,
-        ),
-        growth(
-            "load-pixels",
-            "A still life in a larger and larger picture",
-            "rows",
-            vec![90.0, 180.0, 360.0, 720.0],
-            scenes::pixels,
-        ),
     ]
 }
