@@ -251,3 +251,16 @@ fn an_interrupt_ends_the_program_and_leaves_whole_files_only() {
         out.display()
     );
 }
+
+#[test]
+fn view_says_where_the_viewer_comes_from_when_it_is_not_there() {
+    // A copy of the command in a folder of its own has no viewer beside it.
+    let out = folder("view");
+    let alone = out.join("polyptych");
+    std::fs::copy(env!("CARGO_BIN_EXE_polyptych"), &alone).unwrap();
+    let refused = Command::new(&alone).args(["view", "builtin:polyhedra"]).output().unwrap();
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1), "{message}");
+    assert!(message.contains("cargo build --release -p polyptych-viewer"), "{message}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+}

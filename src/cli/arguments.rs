@@ -32,6 +32,21 @@ pub(super) enum Command {
     Backends(BackendsArguments),
     /// Check a plugin against everything that back ends promise; ends with code 4 where a promise is not kept.
     Validate(ValidateArguments),
+    /// Open the viewer: back ends side by side, live.
+    View(ViewerArguments),
+}
+
+#[derive(Args, Debug)]
+pub(super) struct ViewerArguments {
+    /// Scene file, model, or builtin:NAME.
+    #[arg(default_value = "builtin:atelier")]
+    pub(super) scene: String,
+    /// Folder with plugins, besides those of POLYPTYCH_PLUGIN_PATH and the user's own.
+    #[arg(long, value_name = "DIR")]
+    pub(super) plugin_dir: Vec<PathBuf>,
+    /// Run plugins in the viewer's process instead of processes of their own: for those that are trusted.
+    #[arg(long)]
+    pub(super) trust_plugins: bool,
 }
 
 #[derive(Args, Debug)]

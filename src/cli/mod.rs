@@ -12,6 +12,7 @@ mod plan;
 mod render;
 mod stability;
 mod validate;
+mod view;
 
 use arguments::{Arguments, Command};
 use clap::Parser as _;
@@ -65,6 +66,7 @@ pub(crate) fn run() -> ExitCode {
         Some(Command::Convert(arguments)) => convert::run(&arguments),
         Some(Command::Backends(arguments)) => backends::run(&arguments),
         Some(Command::Validate(arguments)) => validate::run(&arguments),
+        Some(Command::View(arguments)) => view::run(&arguments),
     };
     let (message, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,

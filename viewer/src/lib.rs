@@ -11,20 +11,27 @@
 //!  navigation the camera that all panes share: orbit, pan, dolly, fly
 //!  pane       a picture with its name, time and decisions
 //!  settings   the panel of a back end, made from its declared parameters
+//!  difference where two pictures differ, and by how much
+//!  probe      the values of all pictures at one place
+//!  modes      how panes share the window
 //!  viewer     the window: which panes, which mode, which scene
 //! ```
 //!
 //! Nothing that takes long runs on the window's own thread: it only shows what the painters have finished.
 
+mod difference;
 mod loading;
+mod modes;
 mod navigation;
 mod painter;
 mod pane;
+mod probe;
 mod settings;
 mod viewer;
 
 pub use loading::open;
-pub use viewer::{Mode, Viewer};
+pub use modes::Mode;
+pub use viewer::Viewer;
 
 use polyptych::BuiltinBackends;
 use polyptych::scene::Scene;

@@ -24,8 +24,9 @@ const COARSEST: u32 = 8;
 pub(crate) struct Order {
     pub(crate) backend: String,
     pub(crate) scene: Arc<Scene>,
-    /// Camera, size, settings; the channels follow from `channel`.
+    /// Camera, size, settings, and the channels of the full picture.
     pub(crate) need: Need,
+    /// The channel that is looked at.
     pub(crate) channel: Channel,
 }
 
@@ -34,6 +35,7 @@ pub(crate) struct Order {
 pub(crate) struct Painting {
     pub(crate) backend: String,
     pub(crate) pixels: Vec<[u8; 3]>,
+    pub(crate) framebuffer: Arc<Framebuffer>,
     pub(crate) size: [usize; 2],
     /// Whether it has all pixels that were ordered.
     pub(crate) is_full: bool,
@@ -188,16 +190,17 @@ impl Easel {
             (self.renderer, self.cost) = (Some((order.backend.clone(), renderer)), None);
         }
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
-        let need = Need { channels: Channels::of(&[order.channel]), ..order.need.clone() };
+        let need = &order.need;
         let pool = &self.pool;
         let control = || Control::new(pool).cancelled_by(stop);
         let begin = Instant::now();
-        let prepared = pool.install(|| renderer.prepare(&order.scene, &need, &self.converter, &control()))?;
+        let prepared = pool.install(|| renderer.prepare(&order.scene, need, &self.converter, &control()))?;
         let prepare = begin.elapsed();
         let full = f64::from(need.width) * f64::from(need.height);
         for coarse in coarseness(self.cost.map(|cost| Duration::from_secs_f64(cost * full))) {
             let (width, height) = (need.width.div_ceil(coarse), need.height.div_ceil(coarse));
-            let mut target = Framebuffer::new(width, height, need.channels);
+            let channels = if coarse == 1 { need.channels } else { Channels::of(&[order.channel]) };
+            let mut target = Framebuffer::new(width, height, channels);
             let begin = Instant::now();
             let report = pool.install(|| renderer.render(&need.frame(), &mut target, &control()))?;
             let frame = begin.elapsed();
@@ -206,6 +209,7 @@ impl Easel {
             show(Ok(Painting {
                 backend: order.backend.clone(),
                 pixels: displayed(&target, order.channel),
+                framebuffer: Arc::new(target),
                 size: [width as usize, height as usize],
                 is_full: coarse == 1,
                 prepare,

@@ -1,5 +1,6 @@
 //! How is the picture of one back end shown, with its name, its time, and what it did to the scene?
 
+use crate::difference::Comparer;
 use crate::painter::{Painter, Painting};
 use eframe::egui::{self, Color32, Pos2, Rect, RichText, TextureHandle, TextureOptions, Vec2};
 use polyptych::framebuffer::Channel;
@@ -16,11 +17,22 @@ pub(crate) struct Pane {
     shown: Option<Painting>,
     texture: Option<TextureHandle>,
     pub(crate) failure: Option<String>,
+    /// The picture held against the reference's.
+    pub(crate) error: Comparer,
 }
 
 impl Pane {
     pub(crate) fn new(backend: String, channel: Channel, painter: Painter) -> Self {
-        Self { backend, channel, painter, size: [0, 0], shown: None, texture: None, failure: None }
+        Self {
+            backend,
+            channel,
+            painter,
+            size: [0, 0],
+            shown: None,
+            texture: None,
+            failure: None,
+            error: Comparer::default(),
+        }
     }
 
     /// Takes what the painter has finished since the last time.
@@ -44,6 +56,12 @@ impl Pane {
     /// Returns what is shown.
     pub(crate) fn painting(&self) -> Option<&Painting> {
         self.shown.as_ref()
+    }
+
+    /// Tells whether the full picture of what was ordered last is shown, or why there is none.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        let full = self.shown.as_ref().is_some_and(|p| p.is_full && p.backend == self.backend);
+        !self.painter.is_busy() && (full || self.failure.is_some())
     }
 
     /// Draws the picture into a rectangle, or the part of it inside `clip`.
@@ -74,9 +92,10 @@ impl Pane {
         (backends, refused): (&[String], &[String]),
         number: usize,
         scene: &Scene,
+        shows_error: bool,
     ) -> bool {
         let before = (self.backend.clone(), self.channel);
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             let chosen = egui::ComboBox::from_id_salt(("back end", number))
                 .selected_text(&self.backend)
                 .show_ui(ui, |ui| {
@@ -101,6 +120,12 @@ impl Pane {
             let status = ui.label(RichText::new(self.status()).color(color));
             if let Some(painting) = &self.shown {
                 status.on_hover_text(format!("prepared in {:.1} ms", painting.prepare.as_secs_f64() * 1e3));
+            }
+            if let Some(error) = self.error.summary().filter(|_| shows_error) {
+                ui.label(error).on_hover_text(
+                    "Against the exact reference: peak signal-to-noise ratio of the color, pixels off edges that \
+                     show the same object, and the mean error of the distance over the distance.",
+                );
             }
             self.badge(ui, number, scene);
         });

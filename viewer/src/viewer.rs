@@ -1,14 +1,16 @@
 //! The window: which panes, which mode, which scene, and what the keys do.
 
 use crate::ViewerError;
+use crate::difference::Comparer;
 use crate::loading::Loading;
+use crate::modes::Mode;
 use crate::navigation::Navigation;
 use crate::painter::{Order, Painter};
-use crate::pane::{Pane, grid};
-use crate::settings;
-use eframe::egui::{self, Color32, Key, Pos2, Rect, Sense, Stroke, Vec2};
+use crate::pane::Pane;
+use crate::{probe, settings};
+use eframe::egui::{self, Key};
 use polyptych::convert::Converter;
-use polyptych::framebuffer::Channel;
+use polyptych::framebuffer::{Channel, Channels};
 use polyptych::load::add_default_view;
 use polyptych::parallel::Pool;
 use polyptych::scene::Scene;
@@ -21,36 +23,39 @@ const FIRST: [&str; 4] = ["raster", "reference", "voxel", "freeform"];
 /// Most panes at once.
 const MOST: usize = 9;
 
-/// How panes share the window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Beside one another.
-    SideBySide,
-    /// The first two over one another, with a line between them that can be dragged.
-    Wipe,
-}
-
 /// The viewer: back ends side by side, with one camera.
 pub struct Viewer {
     registry: Registry,
-    backends: Vec<String>,
+    pub(crate) backends: Vec<String>,
     /// Why plugins are not among them.
-    refused: Vec<String>,
+    pub(crate) refused: Vec<String>,
     pool: Pool,
     converter: Arc<Converter>,
-    scene: Arc<Scene>,
-    navigation: Navigation,
-    panes: Vec<Pane>,
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) navigation: Navigation,
+    pub(crate) panes: Vec<Pane>,
     /// The pane that keys act on.
-    active: usize,
-    mode: Mode,
+    pub(crate) active: usize,
+    pub(crate) mode: Mode,
     /// Where the line of a wipe is, as a share of the width.
-    line: f32,
+    pub(crate) line: f32,
     /// What was set for each back end, kept while another one is shown.
     settings: BTreeMap<String, Settings>,
     loading: Option<Loading>,
     message: String,
     shows_settings: bool,
+    /// Whether the values of all panes are listed for the place under the mouse.
+    pub(crate) shows_values: bool,
+    /// That place, as shares of a picture's width and height.
+    pub(crate) pointed: Option<[f32; 2]>,
+    /// What differs between the first two panes.
+    pub(crate) difference: Comparer,
+    /// The reference that all panes are held against, while that is wanted.
+    pub(crate) truth: Option<Pane>,
+    /// Whether the reference's picture is still to be ordered: it waits until the panes are done.
+    truth_waits: bool,
+    /// Whether pictures are shown whose comparison is not done yet.
+    compares_still: bool,
 }
 
 impl Viewer {
@@ -79,6 +84,12 @@ impl Viewer {
             loading: None,
             message: String::new(),
             shows_settings: false,
+            shows_values: false,
+            pointed: None,
+            difference: Comparer::default(),
+            truth: None,
+            truth_waits: false,
+            compares_still: false,
         })
     }
 
@@ -120,10 +131,21 @@ impl Viewer {
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.loading.is_none()
-            && self.panes.iter().all(|pane| {
-                let full = pane.painting().is_some_and(|p| p.is_full && p.backend == pane.backend);
-                !pane.painter.is_busy() && (full || pane.failure.is_some())
-            })
+            && !self.compares_still
+            && !self.truth_waits
+            && self.panes.iter().chain(&self.truth).all(Pane::is_at_rest)
+    }
+
+    /// Returns the map of what differs between the first two panes, row by row, in the mode that shows it.
+    #[must_use]
+    pub fn difference(&self) -> Option<&[[u8; 3]]> {
+        self.difference.pixels().filter(|_| self.mode == Mode::Difference)
+    }
+
+    /// Returns how far a pane is from the reference, in words, while that is shown.
+    #[must_use]
+    pub fn error(&self, pane: usize) -> Option<String> {
+        self.panes.get(pane)?.error.summary().filter(|_| self.truth.is_some())
     }
 
     /// Returns the pixels that a pane shows, row by row, with width and height.
@@ -152,19 +174,83 @@ impl Viewer {
         if self.shows_settings {
             changed |= self.show_settings(ui);
         }
+        if self.shows_values {
+            self.show_values(ui);
+        }
         egui::CentralPanel::no_frame().show(ui, |ui| {
             let rect = ui.available_rect_before_wrap();
-            changed |= match self.mode {
-                Mode::Wipe if self.panes.len() >= 2 => self.show_wipe(ui, rect),
-                Mode::SideBySide | Mode::Wipe => self.show_grid(ui, rect),
-            };
+            changed |= self.show_panes(ui, rect);
         });
-        for pane in &mut self.panes {
+        for pane in self.panes.iter_mut().chain(&mut self.truth) {
             pane.update(&ctx);
         }
-        if changed {
-            self.order_all();
+        if let (Some(truth), Some(pane)) = (&mut self.truth, self.panes.first()) {
+            changed |= truth.size != pane.size || truth.channel != pane.channel;
+            (truth.size, truth.channel) = (pane.size, pane.channel);
         }
+        if changed {
+            self.panes.iter().for_each(|pane| self.order(pane));
+            self.truth_waits = self.truth.is_some();
+        }
+        if let Some(truth) = self.truth.as_ref().filter(|_| self.truth_waits)
+            && self.panes.iter().all(Pane::is_at_rest)
+        {
+            self.order(truth);
+            self.truth_waits = false;
+        }
+        self.compare(&ctx);
+    }
+
+    /// Holds full pictures against one another where that is shown.
+    fn compare(&mut self, ctx: &egui::Context) {
+        let full = |pane: &Pane| {
+            pane.painting().filter(|p| p.is_full && !pane.painter.is_busy()).map(|p| p.framebuffer.clone())
+        };
+        self.compares_still = false;
+        if let (Mode::Difference, [first, second, ..]) = (self.mode, &self.panes[..])
+            && let (Some(a), Some(b)) = (full(first), full(second))
+        {
+            self.compares_still |= !self.difference.compare([&a, &b], first.channel, ctx);
+        }
+        let Some(truth) = self.truth.as_ref().filter(|_| !self.truth_waits).and_then(full) else { return };
+        for pane in &mut self.panes {
+            if let Some(picture) = full(pane) {
+                self.compares_still |= !pane.error.compare([&picture, &truth], Channel::Color, ctx);
+            }
+        }
+    }
+
+    /// Lists what all panes show at the place under the mouse.
+    fn show_values(&self, ui: &mut egui::Ui) {
+        egui::Panel::bottom("values").show(ui, |ui| {
+            let Some(place) = self.pointed else {
+                ui.label("Point at a picture: here are the values of all panes at that place.");
+                return;
+            };
+            egui::Grid::new("values of panes").striped(true).show(ui, |ui| {
+                for pane in &self.panes {
+                    ui.strong(&pane.backend);
+                    let picture = pane.painting().map(|painting| &painting.framebuffer);
+                    for (channel, value) in
+                        picture.map(|p| probe::values(p, &self.scene, place)).unwrap_or_default()
+                    {
+                        ui.label(format!("{} {value}", channel.name()));
+                    }
+                    ui.end_row();
+                }
+            });
+        });
+    }
+
+    /// Starts or stops holding all panes against the reference.
+    fn set_truth(&mut self, wanted: bool, ctx: &egui::Context) {
+        self.truth = wanted.then(|| Pane::new("reference".to_owned(), Channel::Color, self.painter(ctx)));
+    }
+
+    fn painter(&self, ctx: &egui::Context) -> Painter {
+        let wake = ctx.clone();
+        let (registry, pool, converter) = (self.registry.clone(), self.pool.clone(), self.converter.clone());
+        Painter::new(registry, pool, converter, move || wake.request_repaint())
     }
 
     /// Opens as many panes as asked for, or closes the last ones.
@@ -177,19 +263,10 @@ impl Viewer {
             let fallback = self.backends.get(index % self.backends.len().max(1));
             let known = self.backends.iter().find(|id| *id == wanted).or(fallback);
             let Some(backend) = known.cloned() else { return };
-            let wake = ctx.clone();
-            let painter =
-                Painter::new(self.registry.clone(), self.pool.clone(), self.converter.clone(), move || {
-                    wake.request_repaint();
-                });
+            let painter = self.painter(ctx);
             self.panes.push(Pane::new(backend, Channel::Color, painter));
         }
         self.active = self.active.min(count - 1);
-    }
-
-    /// Orders the pictures of all panes anew.
-    fn order_all(&self) {
-        self.panes.iter().for_each(|pane| self.order(pane));
     }
 
     fn order(&self, pane: &Pane) {
@@ -198,7 +275,9 @@ impl Viewer {
             return;
         }
         let settings = self.settings(&pane.backend);
-        let need = Need { settings, ..Need::new(self.navigation.camera.clone(), width, height) };
+        let held_together = self.shows_values || self.truth.is_some() || self.mode == Mode::Difference;
+        let channels = if held_together { Channels::ALL } else { Channels::of(&[pane.channel]) };
+        let need = Need { settings, channels, ..Need::new(self.navigation.camera.clone(), width, height) };
         pane.painter.order(Order {
             backend: pane.backend.clone(),
             scene: self.scene.clone(),
@@ -249,9 +328,9 @@ impl Viewer {
             Key::Num8,
             Key::Num9,
         ];
-        let (digit, frame, next, wipe) = ctx.input(|i| {
+        let (digit, frame, next) = ctx.input(|i| {
             let digit = DIGITS.iter().position(|key| i.key_pressed(*key));
-            (digit, i.key_pressed(Key::F), i.key_pressed(Key::C), i.key_pressed(Key::X))
+            (digit, i.key_pressed(Key::F), i.key_pressed(Key::C))
         });
         let mut changed = ctx.input(|i| self.navigation.follow_keys(i));
         if changed {
@@ -279,8 +358,15 @@ impl Viewer {
             pane.channel = Channel::ALL[(at + 1) % Channel::ALL.len()];
             changed = true;
         }
-        if wipe {
-            self.mode = if self.mode == Mode::Wipe { Mode::SideBySide } else { Mode::Wipe };
+        for (key, mode) in [(Key::X, Mode::Wipe), (Key::Z, Mode::Flip), (Key::G, Mode::Difference)] {
+            if ctx.input(|i| i.key_pressed(key)) {
+                self.mode = if self.mode == mode { Mode::SideBySide } else { mode };
+                changed = true;
+            }
+        }
+        if ctx.input(|i| i.key_pressed(Key::V)) {
+            self.shows_values = !self.shows_values;
+            changed = true;
         }
         changed
     }
@@ -314,15 +400,23 @@ impl Viewer {
                     }
                 }
                 ui.separator();
-                ui.selectable_value(&mut self.mode, Mode::SideBySide, "Side by side");
-                ui.selectable_value(&mut self.mode, Mode::Wipe, "Wipe");
+                for (mode, name) in Mode::ALL {
+                    changed |= ui.selectable_value(&mut self.mode, mode, name).changed();
+                }
+                ui.separator();
                 ui.toggle_value(&mut self.shows_settings, "Settings");
+                changed |= ui.toggle_value(&mut self.shows_values, "Values").changed();
+                let mut wanted = self.truth.is_some();
+                if ui.toggle_value(&mut wanted, "Errors").changed() {
+                    self.set_truth(wanted, ctx);
+                    changed = true;
+                }
                 ui.separator();
                 ui.label(&self.message);
             });
             ui.small(
                 "Drag: orbit. Shift-drag: pan. Scroll: nearer. WASD QE: fly. F: show all. 1-9: back end of the \
-                 chosen pane. C: channel. X: wipe. Drop a file: open it.",
+                 chosen pane. C: channel. X: wipe. Z: flip. G: difference. V: values. Drop a file: open it.",
             );
         });
         changed
@@ -339,88 +433,6 @@ impl Viewer {
         });
         panel.inner
     }
-
-    /// Shows the panes beside one another. Tells whether pictures change.
-    fn show_grid(&mut self, ui: &mut egui::Ui, rect: Rect) -> bool {
-        let mut changed = false;
-        let cells = grid(rect, self.panes.len());
-        for (index, cell) in cells.into_iter().enumerate() {
-            changed |= self.show_pane(ui, index, cell.shrink(2.0));
-        }
-        changed
-    }
-
-    fn show_pane(&mut self, ui: &mut egui::Ui, index: usize, cell: Rect) -> bool {
-        let mut changed = false;
-        let (scene, backends, refused) = (self.scene.clone(), &self.backends, &self.refused);
-        let pane = &mut self.panes[index];
-        let header = ui.scope_builder(egui::UiBuilder::new().max_rect(cell), |ui| {
-            changed |= pane.header(ui, (backends, refused), index, &scene);
-        });
-        let top = header.response.rect.bottom() + 2.0;
-        let picture = Rect::from_min_max(Pos2::new(cell.left(), top.min(cell.bottom())), cell.max);
-        let response = ui.interact(picture, ui.scope_id().with(("picture", index)), Sense::click_and_drag());
-        pane.draw(ui.painter(), picture, picture);
-        changed |= resize(pane, picture, ui.ctx().pixels_per_point());
-        if response.hovered() || response.dragged() {
-            self.active = index;
-        }
-        if self.active == index && self.panes.len() > 1 {
-            let stroke = Stroke::new(1.0, ui.visuals().selection.bg_fill);
-            ui.painter().rect_stroke(picture, 0.0, stroke, egui::StrokeKind::Outside);
-        }
-        changed | self.navigation.follow(ui, &response)
-    }
-
-    /// Shows the first two panes over one another. Tells whether pictures change.
-    fn show_wipe(&mut self, ui: &mut egui::Ui, rect: Rect) -> bool {
-        let mut changed = false;
-        let scene = self.scene.clone();
-        let halves = grid(rect, 2);
-        let mut top = rect.top();
-        for (index, half) in halves.into_iter().enumerate() {
-            let header = ui.scope_builder(egui::UiBuilder::new().max_rect(half), |ui| {
-                changed |= self.panes[index].header(ui, (&self.backends, &self.refused), index, &scene);
-            });
-            top = top.max(header.response.rect.bottom() + 2.0);
-        }
-        let picture = Rect::from_min_max(Pos2::new(rect.left(), top.min(rect.bottom())), rect.max);
-        let response = ui.interact(picture, ui.scope_id().with("wipe"), Sense::click_and_drag());
-        let x = picture.left() + picture.width() * self.line;
-        let handle =
-            Rect::from_center_size(Pos2::new(x, picture.center().y), Vec2::new(9.0, picture.height()));
-        let grip = ui.interact(handle, ui.scope_id().with("line"), Sense::drag());
-        if let Some(pointer) = grip.interact_pointer_pos().filter(|_| grip.dragged()) {
-            self.line = ((pointer.x - picture.left()) / picture.width().max(1.0)).clamp(0.0, 1.0);
-        }
-        if grip.hovered() || grip.dragged() {
-            ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
-        }
-        for index in 0..2 {
-            let (mut clip, pixels) = (picture, ui.ctx().pixels_per_point());
-            if index == 0 {
-                clip.max.x = x;
-            } else {
-                clip.min.x = x;
-            }
-            changed |= resize(&mut self.panes[index], picture, pixels);
-            self.panes[index].draw(ui.painter(), picture, clip);
-        }
-        ui.painter().vline(x, picture.y_range(), Stroke::new(1.5, Color32::WHITE));
-        if let Some(pointer) = response.hover_pos() {
-            self.active = usize::from(pointer.x > x);
-        }
-        changed | (!grip.dragged() && self.navigation.follow(ui, &response))
-    }
-}
-
-/// Fits a pane's picture to its place on the screen. Tells whether its size changed.
-fn resize(pane: &mut Pane, picture: Rect, pixels_per_point: f32) -> bool {
-    let pixels = |points: f32| (points * pixels_per_point).round().clamp(0.0, 16384.0) as u32;
-    let size = [pixels(picture.width()), pixels(picture.height())];
-    let changed = pane.size != size;
-    pane.size = size;
-    changed
 }
 
 impl eframe::App for Viewer {

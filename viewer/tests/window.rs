@@ -135,6 +135,66 @@ fn a_parameter_changes_the_picture_and_is_kept() {
 }
 
 #[test]
+fn what_differs_between_two_panes_is_mapped() {
+    let mut harness = window("polyhedra");
+    press(&mut harness, Key::G);
+    assert_eq!(harness.state().mode(), Mode::Difference);
+    let bright = |harness: &Harness<'_, Viewer>| {
+        let map = harness.state().difference().expect("a map");
+        assert_eq!(map.len(), harness.state().picture(0).unwrap().0.len());
+        map.iter().filter(|p| p[0] > 60).count()
+    };
+    let edges = bright(&harness);
+    let all = harness.state().picture(0).unwrap().0.len();
+    assert!(edges > 20 && edges < all / 20, "raster and reference differ at edges only: {edges} of {all}");
+    // The first pane becomes the reference, too.
+    drag(&mut harness, Pos2::new(60.0, 200.0), Pos2::new(60.0, 200.0));
+    press(&mut harness, Key::Num1);
+    let same = harness.state().shown().nth(0) == harness.state().shown().nth(1);
+    assert!(same, "{:?}", harness.state().shown().collect::<Vec<_>>());
+    assert_eq!(bright(&harness), 0);
+    press(&mut harness, Key::G);
+    assert_eq!((harness.state().mode(), harness.state().difference()), (Mode::SideBySide, None));
+}
+
+#[test]
+fn panes_are_held_against_the_reference_and_their_values_listed() {
+    let mut harness = window("polyhedra");
+    assert_eq!(harness.state().error(0), None);
+    harness.get_by_label("Errors").click();
+    rest(&mut harness);
+    let error = |harness: &Harness<'_, Viewer>, pane| harness.state().error(pane).expect("an error");
+    assert!(error(&harness, 0).contains(" dB, ids 100.00 %"), "{}", error(&harness, 0));
+    assert!(error(&harness, 1).starts_with("same color, ids 100.00 %"), "{}", error(&harness, 1));
+    harness.get_by_label("Errors").click();
+    rest(&mut harness);
+    assert_eq!(harness.state().error(0), None);
+    // The middle of the picture shows an object; both back ends say which.
+    press(&mut harness, Key::V);
+    drag(&mut harness, Pos2::new(160.0, 180.0), Pos2::new(160.0, 180.0));
+    rest(&mut harness);
+    let labels: Vec<_> = harness.query_all_by_label_contains("id ").map(|n| n.value()).collect();
+    assert_eq!(labels.len(), 2, "{labels:?}");
+    assert!(harness.query_all_by_label_contains("distance ").count() == 2);
+}
+
+#[test]
+fn space_flips_between_two_panes() {
+    let mut harness = window("polyhedra");
+    press(&mut harness, Key::Z);
+    assert_eq!(harness.state().mode(), Mode::Flip);
+    assert!(harness.query_by_label_contains("hold space").is_none(), "it is painted, not a widget");
+    harness.key_down(Key::Space);
+    harness.run_steps(2);
+    press(&mut harness, Key::Num3);
+    assert_eq!(harness.state().shown().collect::<Vec<_>>(), ["raster", "voxel"], "keys act on the pane seen");
+    harness.key_up(Key::Space);
+    harness.run_steps(2);
+    press(&mut harness, Key::Num4);
+    assert_eq!(harness.state().shown().collect::<Vec<_>>(), ["freeform", "voxel"]);
+}
+
+#[test]
 fn modes_and_panes_follow_the_bar() {
     let mut harness = window("polyhedra");
     harness.get_by_label("Wipe").click();

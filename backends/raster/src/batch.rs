@@ -1,59 +1,49 @@
-//! How are many pixels resolved at once? As arrays, one number of each in a row, which the compiler turns into
-//! the widest registers there are.
+//! How are visible pixels resolved? Eight at once: where their rays meet the triangles seen, and what is there.
+//!
+//! Eight pixels in a row that show one triangle, as most do where triangles are large, are met in lanes. Others are
+//! met one by one and go on in lanes from there. Both give the same bytes.
 
 use crate::face::{Face, Place};
 use crate::info::Shading;
 use crate::lens::Lens;
 use crate::model::Model;
 use glam::{DVec3, Vec3};
-use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Vec3x8};
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, I32x8, LANES, Vec3x8};
 use polyptych_core::scene::{Material, Scene};
-
-/// Samples of a batch.
-pub(crate) const BATCH: usize = 32;
-
-/// Groups of eight in a batch.
-pub(crate) const OCTETS: usize = BATCH / LANES;
-
-/// Reads the vector of a sample.
-macro_rules! at {
-    ($vectors:expr, $i:expr) => {
-        $vectors[$i / LANES].get($i % LANES)
-    };
-}
-pub(crate) use at;
 
 /// Places of the picture with the triangle seen there, and what resolving and lighting found out.
 pub(crate) struct Batch<'a> {
     pub(crate) count: usize,
+    /// Whether all places are filled and show one triangle.
+    pub(crate) is_one: bool,
     /// Place in the picture.
-    x: [f64; BATCH],
-    y: [f64; BATCH],
+    x: F64x8,
+    y: F64x8,
     /// Index of the triangle in the tile's table.
-    pub(crate) face: [u16; BATCH],
+    pub(crate) face: [u16; LANES],
     /// What the painter needs to know to put the sample where it belongs.
-    pub(crate) tag: [u32; BATCH],
+    pub(crate) tag: [u32; LANES],
     /// Along the ray, in lengths of its direction.
-    t: [f64; BATCH],
+    t: F64x8,
     /// Of the triangle's second and third corner.
-    pub(crate) weights: [[f32; 2]; BATCH],
+    pub(crate) weights: [F32x8; 2],
     /// Along the ray, meters.
-    pub(crate) distance: [f64; BATCH],
+    pub(crate) distance: F64x8,
     /// Relative to the lens's origin, never outside of the triangle.
-    pub(crate) place: [DVec3x8; OCTETS],
+    pub(crate) place: DVec3x8,
     /// Unit true normal on the viewer's side.
-    pub(crate) true_normal: [DVec3x8; OCTETS],
+    pub(crate) true_normal: DVec3x8,
     /// Unit shading normal, turned along with the true one.
-    pub(crate) normal: [Vec3x8; OCTETS],
+    pub(crate) normal: Vec3x8,
     /// Unit vector to the eye.
-    pub(crate) to_eye: [Vec3x8; OCTETS],
-    pub(crate) color: [Vec3x8; OCTETS],
-    pub(crate) opacity: [f32; BATCH],
-    pub(crate) material: [Option<&'a Material>; BATCH],
+    pub(crate) to_eye: Vec3x8,
+    pub(crate) color: Vec3x8,
+    pub(crate) opacity: [f32; LANES],
+    pub(crate) material: [Option<&'a Material>; LANES],
     /// Light that leaves towards the eye.
-    pub(crate) lit: [Vec3x8; OCTETS],
+    pub(crate) lit: Vec3x8,
     /// Share of the shadow-casting lights that arrive.
-    pub(crate) shadow: [f32; BATCH],
+    pub(crate) shadow: F32x8,
 }
 
 /// What is asked of a point beyond its place and normals.
@@ -67,35 +57,53 @@ pub(crate) enum Ask {
 
 impl Batch<'_> {
     pub(crate) fn new() -> Self {
+        let (one, black) = (F64x8::splat(1.0), Vec3x8::splat(Vec3::ZERO));
         Self {
             count: 0,
-            x: [0.0; BATCH],
-            y: [0.0; BATCH],
-            face: [0; BATCH],
-            tag: [0; BATCH],
-            t: [1.0; BATCH],
-            weights: [[0.0; 2]; BATCH],
-            distance: [1.0; BATCH],
-            place: [DVec3x8::splat(DVec3::ZERO); OCTETS],
-            true_normal: [DVec3x8::splat(DVec3::ZERO); OCTETS],
-            normal: [Vec3x8::splat(Vec3::ZERO); OCTETS],
-            to_eye: [Vec3x8::splat(Vec3::ZERO); OCTETS],
-            color: [Vec3x8::splat(Vec3::ZERO); OCTETS],
-            opacity: [1.0; BATCH],
-            material: [None; BATCH],
-            lit: [Vec3x8::splat(Vec3::ZERO); OCTETS],
-            shadow: [1.0; BATCH],
+            is_one: false,
+            x: F64x8::splat(0.0),
+            y: F64x8::splat(0.0),
+            face: [0; LANES],
+            tag: [0; LANES],
+            t: one,
+            weights: [F32x8::ZERO; 2],
+            distance: one,
+            place: DVec3x8::splat(DVec3::ZERO),
+            true_normal: DVec3x8::splat(DVec3::ZERO),
+            normal: black,
+            to_eye: black,
+            color: black,
+            opacity: [1.0; LANES],
+            material: [None; LANES],
+            lit: black,
+            shadow: F32x8::splat(1.0),
         }
     }
 
+    #[inline(always)]
     pub(crate) fn push(&mut self, x: f64, y: f64, face: u16, tag: u32) {
         let i = self.count;
-        (self.x[i], self.y[i], self.face[i], self.tag[i]) = (x, y, face, tag);
+        (self.x.0[i], self.y.0[i], self.face[i], self.tag[i]) = (x, y, face, tag);
         self.count += 1;
     }
 
+    /// Fills an empty batch with pixels of a row that show one triangle; `x` and `y` are the first one's center.
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, x: f64, y: f64, face: u16, tag: u32) {
+        (self.count, self.is_one) = (LANES, true);
+        self.x = F64x8::splat(x) + I32x8::count_from(0).to_f64();
+        self.y = F64x8::splat(y);
+        self.face = [face; LANES];
+        self.tag = std::array::from_fn(|lane| tag + lane as u32);
+    }
+
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        (self.count, self.is_one) = (0, false);
+    }
+
     pub(crate) fn is_full(&self) -> bool {
-        self.count == BATCH
+        self.count == LANES
     }
 }
 
@@ -110,31 +118,64 @@ impl<'a> Batch<'a> {
         faces: &[Face],
         (ask, shading): (Ask, Shading),
     ) {
-        let (mut held, mut any_held) = ([DVec3::NAN; BATCH], false);
+        if self.is_one {
+            let face = &faces[usize::from(self.face[0])];
+            if let Some(met) = face.meet_all(lens, self.x, self.y) {
+                self.t = met.t;
+                self.weights = met.weights;
+                let side = if met.from_within { -1.0 } else { 1.0 };
+                let outward = face.outward * side;
+                self.true_normal = DVec3x8::splat(outward);
+                self.normal = if shading == Shading::Flat {
+                    Vec3x8::splat(outward.as_vec3())
+                } else {
+                    face.normals_of(&met).scaled(F32x8::splat(side as f32))
+                };
+                let material = face.material(scene, model);
+                self.material = [Some(material); LANES];
+                if ask == Ask::Color {
+                    if face.is_painted {
+                        for i in 0..LANES {
+                            let place = Place { scene, model, lens, x: self.x.0[i], y: self.y.0[i] };
+                            let (color, opacity) = face.color(&place, &met.of(i));
+                            self.opacity[i] = opacity;
+                            self.color.set(i, color);
+                        }
+                    } else {
+                        self.opacity = [material.effective_opacity(material.opacity).min(1.0); LANES];
+                        self.color = Vec3x8::splat(material.base_color);
+                    }
+                }
+                self.reach(lens);
+                self.straighten();
+                return;
+            }
+        }
+        let (mut held, mut any_held) = ([DVec3::NAN; LANES], false);
         for i in 0..self.count {
-            let (face, x, y) = (&faces[usize::from(self.face[i])], self.x[i], self.y[i]);
+            let (face, x, y) = (&faces[usize::from(self.face[i])], self.x.0[i], self.y.0[i]);
             let met = face.meet(lens, x, y);
-            self.t[i] = met.t;
-            self.weights[i] = [met.weights[1] as f32, met.weights[2] as f32];
+            self.t.0[i] = met.t;
+            (self.weights[0].0[i], self.weights[1].0[i]) = (met.weights[1] as f32, met.weights[2] as f32);
             if let Some(place) = met.held {
                 (held[i], any_held) = (place, true);
             }
             let outward = face.outward;
             let normal = if shading == Shading::Flat { outward.as_vec3() } else { face.normal(&met) };
             let (normal, outward) = if met.from_within { (-normal, -outward) } else { (normal, outward) };
-            self.normal[i / LANES].set(i % LANES, normal);
-            self.true_normal[i / LANES].set(i % LANES, outward);
+            self.normal.set(i, normal);
+            self.true_normal.set(i, outward);
             self.material[i] = Some(face.material(scene, model));
             if ask == Ask::Color {
                 let (color, opacity) = face.color(&Place { scene, model, lens, x, y }, &met);
                 self.opacity[i] = opacity;
-                self.color[i / LANES].set(i % LANES, color);
+                self.color.set(i, color);
             }
         }
         self.reach(lens);
         for i in (0..self.count).filter(|_| any_held) {
             if held[i].is_finite() {
-                self.place[i / LANES].set(i % LANES, held[i]);
+                self.place.set(i, held[i]);
             }
         }
         self.straighten();
@@ -143,25 +184,19 @@ impl<'a> Batch<'a> {
     /// Goes along all rays: places, distances, directions to the eye.
     #[inline(always)]
     fn reach(&mut self, lens: &Lens) {
-        for o in 0..self.count.div_ceil(LANES) {
-            let of = |numbers: &[f64; BATCH]| F64x8::load(&numbers[o * LANES..]);
-            let (start, direction) = lens.lines(of(&self.x), of(&self.y));
-            let (t, length) = (of(&self.t), direction.length());
-            (t * length).store(&mut self.distance[o * LANES..]);
-            self.to_eye[o] = direction.scaled(F64x8::splat(-1.0) / length).round();
-            self.place[o] = start + direction.scaled(t);
-        }
+        let (start, direction) = lens.lines(self.x, self.y);
+        let length = direction.length();
+        self.distance = self.t * length;
+        self.to_eye = direction.scaled(F64x8::splat(-1.0) / length).round();
+        self.place = start + direction.scaled(self.t);
     }
 
     /// Gives shading normals unit length; the true normal where there is none.
     #[inline(always)]
     fn straighten(&mut self) {
         let (zero, infinity) = (F32x8::splat(0.0), F32x8::splat(f32::INFINITY));
-        for o in 0..self.count.div_ceil(LANES) {
-            let share = F32x8::splat(1.0) / self.normal[o].length();
-            let good = share.above(zero) & infinity.above(share);
-            let straight = self.normal[o].scaled(share);
-            self.normal[o] = Vec3x8::pick(good, straight, self.true_normal[o].round());
-        }
+        let share = F32x8::splat(1.0) / self.normal.length();
+        let good = share.above(zero) & infinity.above(share);
+        self.normal = Vec3x8::pick(good, self.normal.scaled(share), self.true_normal.round());
     }
 }

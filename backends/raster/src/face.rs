@@ -9,6 +9,7 @@ use crate::lens::{Lens, OnRays};
 use crate::model::{Model, Part};
 use crate::tile::NO_TRIANGLE;
 use glam::{DVec2, DVec3, Vec2, Vec3};
+use polyptych_core::lanes::{F32x8, F64x8, Vec3x8};
 use polyptych_core::scene::{Mapping, Material, Mesh, Scene, Texture};
 
 /// Weights of corners that a snapped corner may cause outside of the triangle are extrapolated up to here;
@@ -48,6 +49,24 @@ pub(crate) struct Met {
     pub(crate) from_within: bool,
     /// The nearest point of the triangle, where the ray passes beside it.
     pub(crate) held: Option<DVec3>,
+}
+
+/// Where eight rays meet a triangle, all of them inside and from one side.
+pub(crate) struct MetAll {
+    pub(crate) t: F64x8,
+    v: F64x8,
+    w: F64x8,
+    /// Of the second and third corner.
+    pub(crate) weights: [F32x8; 2],
+    pub(crate) from_within: bool,
+}
+
+impl MetAll {
+    /// Returns where one of the rays meets it.
+    pub(crate) fn of(&self, lane: usize) -> Met {
+        let (v, w) = (self.v.0[lane], self.w.0[lane]);
+        Met { t: self.t.0[lane], weights: [1.0 - v - w, v, w], from_within: self.from_within, held: None }
+    }
 }
 
 /// A place of the picture of a scene.
@@ -107,6 +126,33 @@ impl Face {
         let met = Met { t, weights, from_within, held: None };
         let lowest = weights[0].min(v).min(w);
         if lowest >= 0.0 { met } else { self.hold(&met, lowest, lens, x, y) }
+    }
+
+    /// Meets the rays through eight places; nothing if one of them passes beside the triangle.
+    #[inline(always)]
+    pub(crate) fn meet_all(&self, lens: &Lens, x: F64x8, y: F64x8) -> Option<MetAll> {
+        let zero = F64x8::splat(0.0);
+        let (start, slope) = self.across.at_all(lens.rays, x, y);
+        let t = (F64x8::splat(self.height) - start) / slope;
+        let weight = |i: usize| {
+            let (start, slope) = self.weights[i].at_all(lens.rays, x, y);
+            (start - F64x8::splat(self.offsets[i])) + slope * t
+        };
+        let (v, w) = (weight(0), weight(1));
+        let inside = (F64x8::splat(1.0) - v - w).at_least(zero) & v.at_least(zero) & w.at_least(zero);
+        let (up, down) = (slope.above(zero), zero.above(slope));
+        if (!inside).any() || ((!up).any() && (!down).any()) {
+            return None;
+        }
+        let from_within = up.has(0) != self.is_mirrored;
+        Some(MetAll { t, v, w, weights: [v.round(), w.round()], from_within })
+    }
+
+    /// Returns the interpolated shading normals, not of unit length, on the outside.
+    #[inline(always)]
+    pub(crate) fn normals_of(&self, met: &MetAll) -> Vec3x8 {
+        let [a, b, c] = self.normals.map(Vec3x8::splat);
+        a + b.scaled(met.weights[0]) + c.scaled(met.weights[1])
     }
 
     /// Returns a corner relative to the lens's origin, and its shading normal, not of unit length.

@@ -305,6 +305,19 @@ impl OnRays {
     }
 }
 
+impl OnRays {
+    /// The same for eight rays.
+    #[inline(always)]
+    pub(crate) fn at_all(&self, rays: Rays, x: F64x8, y: F64x8) -> (F64x8, F64x8) {
+        let of = F64x8::splat;
+        let (own, shared) = (of(self.base) + of(self.by_column) * x + of(self.by_row) * y, of(self.shared));
+        match rays {
+            Rays::Central => (shared, own),
+            Rays::Parallel => (own, shared),
+        }
+    }
+}
+
 impl ScreenFromObject {
     pub(crate) fn apply(&self, p: DVec3) -> Homogeneous {
         Homogeneous { x: self.column.at(p), y: self.row.at(p), ahead: self.ahead.at(p) }

@@ -1,15 +1,15 @@
 //! How much light leaves a point towards the eye, and how many lights reach it?
 
-use crate::batch::{BATCH, Batch, OCTETS, at};
+use crate::batch::Batch;
 use crate::face::Face;
 use crate::gouraud::Gouraud;
 use crate::model::Model;
 use crate::shadow::{Looks, Shadows, Sight};
 use glam::{DAffine3, DVec3, Vec3};
-use polyptych_core::lanes::{DVec3x8, F32x8, LANES, Vec3x8};
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
-use polyptych_core::scene::{Arriving, Light, LightKind, LightingModel, Scene, Shape};
-use polyptych_core::shade::{lit_by_material, turned_away};
+use polyptych_core::scene::{Arriving, Light, LightKind, LightingModel, Material, Scene, Shape};
+use polyptych_core::shade::{Surfaces, lit_by_material};
 
 /// A light, made ready.
 pub(crate) struct Lamp {
@@ -100,145 +100,161 @@ impl Illumination<'_> {
         wants: Wants,
     ) {
         self.fill_ambient(batch, wants);
-        let (mut casting, mut reaching) = ([0u32; BATCH], [0u32; BATCH]);
+        let used = Mask8::first(batch.count);
+        let taking = self.taking_shadow(batch, faces) & used;
+        let (mut casting, mut reaching, one) = (F32x8::ZERO, F32x8::ZERO, F32x8::splat(1.0));
         for (index, lamp) in self.lamps.iter().enumerate() {
             let arrivals = Arrivals::of(lamp, batch, origin);
             let added = match corners {
-                _ if !wants.color => [BLACK; OCTETS],
+                _ if !wants.color => Vec3x8::splat(Vec3::ZERO),
                 None => self.added(batch, &arrivals),
                 Some(corners) => self.interpolated(batch, corners, index),
             };
-            let casts = lamp.light.casts_shadow;
-            let (mut arrives, mut crosses) = ([false; BATCH], [false; BATCH]);
-            for i in (0..batch.count).filter(|&i| arrivals.distance[i] > 0.0) {
-                casting[i] += u32::from(casts);
-                let away = turned_away(at!(batch.true_normal, i), at!(arrivals.to_light, i));
-                let adds = at!(added, i) != Vec3::ZERO;
-                arrives[i] = !away && ((wants.shadow && casts) || adds);
-                crosses[i] = arrives[i] && casts && self.takes_shadow(&faces[usize::from(batch.face[i])]);
-            }
-            let looks = match self.shadows.filter(|_| crosses.contains(&true)) {
-                Some(shadows) => shadows.look(index, &batch.place, origin, &crosses),
-                None => Looks::none(),
-            };
-            for i in (0..batch.count).filter(|&i| arrives[i]) {
-                let triangle = faces[usize::from(batch.face[i])].id;
-                if looks.see_more_than(i, triangle)
-                    && self.is_blocked(&looks, i, (at!(batch.place, i), origin), triangle, &arrivals)
-                {
-                    continue;
+            let (casts, zero) = (lamp.light.casts_shadow, F64x8::splat(0.0));
+            let comes = arrivals.distance.above(zero) & used;
+            let faces_light = !turned_away_all(batch.true_normal, arrivals.to_light);
+            let counts = if wants.shadow && casts { Mask8::ALL } else { is_not_black(added) };
+            let mut arrives = comes & faces_light & counts;
+            let crosses = if casts { arrives & taking } else { Mask8::NONE };
+            if let Some(shadows) = self.shadows.filter(|_| crosses.any()) {
+                let looks = shadows.look(index, batch.place, origin, crosses);
+                for i in (0..batch.count).filter(|&i| crosses.has(i)) {
+                    let triangle = faces[usize::from(batch.face[i])].id;
+                    let place = || (batch.place.get(i), origin);
+                    if looks.see_more_than(i, triangle)
+                        && self.is_blocked(shadows, &looks, i, place(), triangle, &arrivals)
+                    {
+                        arrives.0[i] = 0;
+                    }
                 }
-                batch.lit[i / LANES].set(i % LANES, at!(batch.lit, i) + at!(added, i));
-                reaching[i] += u32::from(casts);
+            }
+            batch.lit = Vec3x8::pick(arrives, batch.lit + added, batch.lit);
+            if casts {
+                casting = comes.pick(casting + one, casting);
+                reaching = arrives.pick(reaching + one, reaching);
             }
         }
-        for i in 0..batch.count {
-            let takes = casting[i] > 0 && self.takes_shadow(&faces[usize::from(batch.face[i])]);
-            batch.shadow[i] = if takes { reaching[i] as f32 / casting[i] as f32 } else { 1.0 };
+        let counts = taking & casting.above(F32x8::ZERO);
+        batch.shadow = counts.pick(reaching / casting, one);
+    }
+
+    /// Tells on which samples light can be blocked on its way.
+    #[inline(always)]
+    fn taking_shadow(&self, batch: &Batch<'_>, faces: &[Face]) -> Mask8 {
+        let takes = |face: u16| {
+            let takes = self.model.parts[faces[usize::from(face)].part as usize].takes_shadow;
+            if takes { u32::MAX } else { 0 }
+        };
+        if batch.is_one {
+            return Mask8([takes(batch.face[0]); LANES]);
         }
+        let mut mask = Mask8::NONE;
+        (0..batch.count).for_each(|i| mask.0[i] = takes(batch.face[i]));
+        mask
     }
 
     #[inline(always)]
     fn fill_ambient(&self, batch: &mut Batch<'_>, wants: Wants) {
         let ambient = self.scene.environment.ambient;
+        let light = |material: &Material, color: Vec3| material.emission + ambient * color * material.ambient;
+        batch.lit = Vec3x8::splat(Vec3::ZERO);
+        if batch.is_one && wants.color {
+            let Some(material) = batch.material[0] else { return };
+            let share = Vec3x8::splat(ambient) * batch.color * Vec3x8::splat(Vec3::splat(material.ambient));
+            batch.lit = Vec3x8::splat(material.emission) + share;
+            return;
+        }
         for i in 0..batch.count {
-            let light = batch.material[i].filter(|_| wants.color).map_or(Vec3::ZERO, |material| {
-                material.emission + ambient * at!(batch.color, i) * material.ambient
-            });
-            batch.lit[i / LANES].set(i % LANES, light);
+            if let Some(material) = batch.material[i].filter(|_| wants.color) {
+                batch.lit.set(i, light(material, batch.color.get(i)));
+            }
         }
     }
 
     /// Returns what an unshadowed light adds to all samples, material by material.
     #[inline(always)]
-    fn added(&self, batch: &Batch<'_>, arrivals: &Arrivals) -> [Vec3x8; OCTETS] {
-        let mut added = [BLACK; OCTETS];
-        for (o, added) in added.iter_mut().enumerate() {
-            let materials = std::array::from_fn(|lane| {
-                batch.material[o * LANES + lane].filter(|_| o * LANES + lane < batch.count)
-            });
-            *added = lit_by_material(
-                materials,
-                (batch.color[o], batch.normal[o], batch.to_eye[o]),
-                self.lighting,
-                arrivals.direction[o],
-                arrivals.radiance[o],
-            );
+    fn added(&self, batch: &Batch<'_>, arrivals: &Arrivals) -> Vec3x8 {
+        let Batch { color, normal, to_eye, .. } = *batch;
+        if let (true, Some(material)) = (batch.is_one, batch.material[0]) {
+            let surfaces = Surfaces { material, color, normal, to_eye };
+            return surfaces.lit_by(self.lighting, arrivals.direction, arrivals.radiance);
         }
-        added
+        let materials = std::array::from_fn(|i| batch.material[i].filter(|_| i < batch.count));
+        let seen = (color, normal, to_eye);
+        lit_by_material(materials, seen, self.lighting, arrivals.direction, arrivals.radiance)
     }
 
     /// Returns what an unshadowed light adds to all samples, interpolated between corners.
-    fn interpolated(&self, batch: &Batch<'_>, corners: &Gouraud, lamp: usize) -> [Vec3x8; OCTETS] {
-        let mut added = [BLACK; OCTETS];
+    fn interpolated(&self, batch: &Batch<'_>, corners: &Gouraud, lamp: usize) -> Vec3x8 {
+        let mut added = Vec3x8::splat(Vec3::ZERO);
         for i in 0..batch.count {
             let of = (usize::from(batch.face[i]), lamp);
-            let light = corners.added(of, self.lamps.len(), at!(batch.color, i), batch.weights[i]);
-            added[i / LANES].set(i % LANES, light);
+            let weights = batch.weights.map(|w| w.0[i]);
+            added.set(i, corners.added(of, self.lamps.len(), batch.color.get(i), weights));
         }
         added
-    }
-
-    fn takes_shadow(&self, face: &Face) -> bool {
-        self.model.parts[face.part as usize].takes_shadow
     }
 
     #[inline(always)]
     fn is_blocked(
         &self,
+        shadows: &Shadows,
         looks: &Looks<'_>,
         i: usize,
         (place, origin): (DVec3, DVec3),
         triangle: u32,
         arrivals: &Arrivals,
     ) -> bool {
-        let Some(shadows) = self.shadows else { return false };
-        let (place, distance) = (place + (origin - shadows.origin), arrivals.distance[i]);
-        let sight = Sight { place, triangle, to_light: at!(arrivals.to_light, i), distance };
+        let (place, distance) = (place + (origin - shadows.origin), arrivals.distance.0[i]);
+        let sight = Sight { place, triangle, to_light: arrivals.to_light.get(i), distance };
         shadows.is_blocked(self.scene, self.model, looks, i, &sight)
     }
 }
 
+/// [`turned_away`] of eight points.
+#[inline(always)]
+fn turned_away_all(true_normal: DVec3x8, to_light: DVec3x8) -> Mask8 {
+    F64x8::splat(0.0).at_least(true_normal.dot(to_light))
+}
+
+#[inline(always)]
+fn is_not_black(color: Vec3x8) -> Mask8 {
+    let zero = F32x8::ZERO;
+    !(color.x.equal(zero) & color.y.equal(zero) & color.z.equal(zero))
+}
+
 /// The light of a lamp at all samples of a batch.
 struct Arrivals {
-    to_light: [DVec3x8; OCTETS],
+    to_light: DVec3x8,
     /// The same in single precision.
-    direction: [Vec3x8; OCTETS],
-    radiance: [Vec3x8; OCTETS],
+    direction: Vec3x8,
+    radiance: Vec3x8,
     /// 0 where no light arrives.
-    distance: [f64; BATCH],
+    distance: F64x8,
 }
 
 impl Arrivals {
     #[inline(always)]
     fn of(lamp: &Lamp, batch: &Batch<'_>, origin: DVec3) -> Self {
-        if let LightKind::Directional { .. } = lamp.light.kind {
-            let none = Arriving { to_light: DVec3::ZERO, distance: 0.0, radiance: Vec3::ZERO };
-            let arriving = lamp.steady.unwrap_or(none);
-            return Self {
-                to_light: [DVec3x8::splat(arriving.to_light); OCTETS],
-                direction: [Vec3x8::splat(arriving.to_light.as_vec3()); OCTETS],
-                radiance: [Vec3x8::splat(arriving.radiance); OCTETS],
-                distance: [arriving.distance; BATCH],
-            };
-        }
-        let mut all = Self {
-            to_light: [DVec3x8::splat(DVec3::ZERO); OCTETS],
-            direction: [BLACK; OCTETS],
-            radiance: [BLACK; OCTETS],
-            distance: [0.0; BATCH],
+        let of = |arriving: &Arriving| Self {
+            to_light: DVec3x8::splat(arriving.to_light),
+            direction: Vec3x8::splat(arriving.to_light.as_vec3()),
+            radiance: Vec3x8::splat(arriving.radiance),
+            distance: F64x8::splat(arriving.distance),
         };
+        let none = Arriving { to_light: DVec3::ZERO, distance: 0.0, radiance: Vec3::ZERO };
+        if let LightKind::Directional { .. } = lamp.light.kind {
+            return of(lamp.steady.as_ref().unwrap_or(&none));
+        }
+        let mut all = of(&none);
         for i in 0..batch.count {
-            if let Some(arriving) = lamp.light.arriving(origin + at!(batch.place, i)) {
-                let (o, lane) = (i / LANES, i % LANES);
-                all.distance[i] = arriving.distance;
-                all.to_light[o].set(lane, arriving.to_light);
-                all.direction[o].set(lane, arriving.to_light.as_vec3());
-                all.radiance[o].set(lane, arriving.radiance);
+            if let Some(arriving) = lamp.light.arriving(origin + batch.place.get(i)) {
+                all.distance.0[i] = arriving.distance;
+                all.to_light.set(i, arriving.to_light);
+                all.direction.set(i, arriving.to_light.as_vec3());
+                all.radiance.set(i, arriving.radiance);
             }
         }
         all
     }
 }
-
-const BLACK: Vec3x8 = Vec3x8 { x: F32x8([0.0; 8]), y: F32x8([0.0; 8]), z: F32x8([0.0; 8]) };

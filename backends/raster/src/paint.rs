@@ -1,6 +1,6 @@
 //! From triangles in tiles to pixels: visibility, then the surfaces that are seen, then their light.
 
-use crate::batch::{Ask, BATCH, Batch, at};
+use crate::batch::{Ask, Batch};
 use crate::bin::Bins;
 use crate::drawing::Drawing;
 use crate::face::Faces;
@@ -10,7 +10,7 @@ use crate::layers::{Fragment, collect, sort};
 use crate::lens::Lens;
 use crate::light::{Illumination, Wants};
 use crate::smooth::Smooth;
-use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH, TileArea, TileBuffer, TileGrid};
+use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileArea, TileBuffer, TileGrid};
 use glam::Vec3;
 use polyptych_core::camera::RowDirections;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
@@ -210,6 +210,10 @@ impl<'a> Painter<'a> {
         // 3. Resolve: surfaces and their light, for what is visible only.
         let layers = Layers::default();
         let mut tile = TilePainter { painter: self, area: *area, band, faces, corners, layers, shaded: 0 };
+        if fragments.is_empty() {
+            tile.draw_solid(&buffer.id);
+            return tile.shaded;
+        }
         let mut samples = Samples { solid: &buffer.id, layers: fragments, pixel: 0, behind_layers: false };
         let (mut batch, mut more) = (Batch::new(), true);
         while more {
@@ -263,8 +267,8 @@ impl<'a> Painter<'a> {
             // Surfaces have the color of the paper.
             let background = &light.scene.environment.background;
             for i in 0..batch.count {
-                let direction = -at!(batch.to_eye, i).as_dvec3();
-                batch.lit[i / LANES].set(i % LANES, background.color(direction));
+                let direction = -batch.to_eye.get(i).as_dvec3();
+                batch.lit.set(i, background.color(direction));
             }
             return;
         }
@@ -277,8 +281,8 @@ impl<'a> Painter<'a> {
         }
         if light.scene.environment.fog.is_some() {
             for i in 0..batch.count {
-                let color = fogged(&light.scene.environment, at!(batch.lit, i), batch.distance[i]);
-                batch.lit[i / LANES].set(i % LANES, color);
+                let color = fogged(&light.scene.environment, batch.lit.get(i), batch.distance.0[i]);
+                batch.lit.set(i, color);
             }
         }
     }
@@ -347,6 +351,30 @@ impl Default for Layers {
 }
 
 impl<'a> TilePainter<'_, 'a, '_> {
+    /// Draws a tile without layers.
+    #[inline(always)]
+    fn draw_solid(&mut self, solid: &[u32; TILE_PIXELS]) {
+        let (mut mixed, mut one) = (Batch::new(), Batch::new());
+        for (octet, ids) in solid.chunks_exact(LANES).enumerate() {
+            let first = (octet * LANES) as u32;
+            if ids[0] != NO_TRIANGLE && ids.iter().all(|&id| id == ids[0]) {
+                let light = &self.painter.light;
+                let face = self.faces.find(light.scene, light.model, self.painter.lens, ids[0]);
+                let (x, y) = self.place(first);
+                one.fill(f64::from(x) + 0.5, f64::from(y) + 0.5, face, first | LAST);
+                self.finish(&mut one);
+                continue;
+            }
+            for (pixel, &id) in (first..).zip(ids).filter(|(_, id)| **id != NO_TRIANGLE) {
+                self.add(&mut mixed, id, pixel | LAST);
+                if mixed.is_full() {
+                    self.finish(&mut mixed);
+                }
+            }
+        }
+        self.finish(&mut mixed);
+    }
+
     /// Adds a sample to a batch that is not full.
     #[inline(always)]
     fn add(&mut self, batch: &mut Batch<'a>, id: u32, tag: u32) {
@@ -366,7 +394,7 @@ impl<'a> TilePainter<'_, 'a, '_> {
     #[inline(always)]
     fn finish(&mut self, batch: &mut Batch<'a>) {
         self.painter.light(batch, self.faces, self.corners);
-        let mut index = [0; BATCH];
+        let mut index = [0; LANES];
         for (index, tag) in index.iter_mut().zip(&batch.tag[..batch.count]) {
             let (x, y) = self.place(*tag);
             *index = ((y - self.band.first_row) * self.band.width + x) as usize;
@@ -378,7 +406,7 @@ impl<'a> TilePainter<'_, 'a, '_> {
         } else {
             self.write(batch, &index[..batch.count]);
         }
-        batch.count = 0;
+        batch.clear();
         if self.faces.is_full() {
             self.faces.clear();
             self.corners.clear();
@@ -394,12 +422,12 @@ impl<'a> TilePainter<'_, 'a, '_> {
         }
         let (parts, faces) = (&self.painter.light.model.parts, &self.faces.faces);
         let object = |i: usize| parts[faces[usize::from(batch.face[i])].part as usize].object;
-        fill(self.band.color, index, |i| finite(at!(batch.lit, i)));
-        fill(self.band.distance, index, |i| batch.distance[i] as f32);
-        fill(self.band.normal, index, |i| finite(at!(batch.normal, i)));
+        fill(self.band.color, index, |i| finite(batch.lit.get(i)));
+        fill(self.band.distance, index, |i| batch.distance.0[i] as f32);
+        fill(self.band.normal, index, |i| finite(batch.normal.get(i)));
         fill(self.band.id, index, |i| object(i) as u32 + 1);
-        fill(self.band.albedo, index, |i| finite(at!(batch.color, i)));
-        fill(self.band.shadow, index, |i| batch.shadow[i]);
+        fill(self.band.albedo, index, |i| finite(batch.color.get(i)));
+        fill(self.band.shadow, index, |i| batch.shadow.0[i]);
         fill(self.band.coverage, index, |_| 1.0);
         self.shaded += index.len() as u64;
     }
@@ -408,10 +436,10 @@ impl<'a> TilePainter<'_, 'a, '_> {
     fn lay(&mut self, batch: &Batch<'_>, i: usize, index: usize) {
         if batch.tag[i] & LAYER == 0 {
             // A solid surface without layers may stand in a batch with layers of others.
-            self.layers = Layers { color: at!(batch.lit, i), clear: 0.0, first: Some(self.seen(batch, i)) };
+            self.layers = Layers { color: batch.lit.get(i), clear: 0.0, first: Some(self.seen(batch, i)) };
         } else if batch.opacity[i] > 0.0 && self.layers.clear >= OPAQUE {
             let layers = &mut self.layers;
-            layers.color += at!(batch.lit, i) * (layers.clear * batch.opacity[i]);
+            layers.color += batch.lit.get(i) * (layers.clear * batch.opacity[i]);
             layers.clear *= 1.0 - batch.opacity[i];
             if layers.first.is_none() {
                 self.layers.first = Some(self.seen(batch, i));
@@ -423,7 +451,7 @@ impl<'a> TilePainter<'_, 'a, '_> {
         let Layers { mut color, clear, first } = std::mem::take(&mut self.layers);
         let painter = self.painter;
         if clear >= OPAQUE && painter.wants.color {
-            let direction = -at!(batch.to_eye, i);
+            let direction = -batch.to_eye.get(i);
             color += finite(painter.light.scene.environment.background.color(direction.as_dvec3())) * clear;
         }
         let color = finite(color);
@@ -437,11 +465,11 @@ impl<'a> TilePainter<'_, 'a, '_> {
         let face = &self.faces.faces[usize::from(batch.face[i])];
         Pixel {
             color: Vec3::ZERO,
-            distance: batch.distance[i] as f32,
-            normal: finite(at!(batch.normal, i)),
+            distance: batch.distance.0[i] as f32,
+            normal: finite(batch.normal.get(i)),
             id: self.painter.light.model.parts[face.part as usize].object as u32 + 1,
-            albedo: finite(at!(batch.color, i)),
-            shadow: batch.shadow[i],
+            albedo: finite(batch.color.get(i)),
+            shadow: batch.shadow.0[i],
             coverage: 1.0,
         }
     }

@@ -14,7 +14,6 @@
 //! Source of storing names instead of depths: J. C. Hourcade, A. Nicolas, *Algorithms for antialiased cast
 //! shadows*, Computers & Graphics 9(3), 1985; comparing planes instead of equal names is ours.
 
-use crate::batch::{BATCH, OCTETS};
 use crate::bin::{Bins, Pass, Without};
 use crate::casters::Casters;
 use crate::face::{Face, Place};
@@ -24,7 +23,7 @@ use crate::model::{Class, Model, Role};
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileBuffer, TileGrid};
 use crate::transform::{ScreenVertex, transform};
 use glam::{DMat3, DVec3, Vec3};
-use polyptych_core::lanes::{DVec3x8, LANES};
+use polyptych_core::lanes::{DVec3x8, LANES, Mask8};
 use polyptych_core::math::{Aabb, orthonormal_basis};
 use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{LightKind, Scene};
@@ -107,15 +106,15 @@ pub(crate) struct Sight {
 /// What the map of a light shows around the points of a batch.
 pub(crate) struct Looks<'a> {
     /// Nothing where the light does not see the point.
-    face: [Option<&'a MapFace>; BATCH],
+    face: [Option<&'a MapFace>; LANES],
     /// Column and row of the first of the texels whose centers are the corners of the square around the point.
-    texel: [[i32; 2]; BATCH],
-    ids: [[u32; 4]; BATCH],
+    texel: [[i32; 2]; LANES],
+    ids: [[u32; 4]; LANES],
 }
 
 impl<'a> Looks<'a> {
     pub(crate) fn none() -> Self {
-        Self { face: [None; BATCH], texel: [[0; 2]; BATCH], ids: [[NO_TRIANGLE; 4]; BATCH] }
+        Self { face: [None; LANES], texel: [[0; 2]; LANES], ids: [[NO_TRIANGLE; 4]; LANES] }
     }
 
     /// Looks where a point falls on a column and row of a face, if the light sees them.
@@ -261,29 +260,20 @@ impl Shadows {
 
     /// Looks points up in the map of a light. `origin` is what the places are relative to.
     #[inline(always)]
-    pub(crate) fn look(
-        &self,
-        lamp: usize,
-        places: &[DVec3x8; OCTETS],
-        origin: DVec3,
-        wanted: &[bool; BATCH],
-    ) -> Looks<'_> {
+    pub(crate) fn look(&self, lamp: usize, places: DVec3x8, origin: DVec3, wanted: Mask8) -> Looks<'_> {
         let mut looks = Looks::none();
         let faces = &self.maps[lamp].faces[..];
         let Some(first) = faces.first() else { return looks };
-        for (o, places) in places.iter().enumerate() {
-            let places = *places + DVec3x8::splat(origin - self.origin);
-            let [x, y, ahead] = first.lens.places(places - DVec3x8::splat(first.lens.origin));
-            for lane in (0..LANES).filter(|lane| wanted[o * LANES + lane]) {
-                let i = o * LANES + lane;
-                if faces.len() == 1 {
-                    looks.look(i, first, x.0[lane], y.0[lane], ahead.0[lane]);
-                } else {
-                    let place = places.get(lane);
-                    let face = &faces[cube_face(place - first.lens.origin)];
-                    let (x, y, ahead) = face.lens.place(place - face.lens.origin);
-                    looks.look(i, face, x, y, ahead);
-                }
+        let places = places + DVec3x8::splat(origin - self.origin);
+        let [x, y, ahead] = first.lens.places(places - DVec3x8::splat(first.lens.origin));
+        for i in (0..LANES).filter(|&i| wanted.has(i)) {
+            if faces.len() == 1 {
+                looks.look(i, first, x.0[i], y.0[i], ahead.0[i]);
+            } else {
+                let place = places.get(i);
+                let face = &faces[cube_face(place - first.lens.origin)];
+                let (x, y, ahead) = face.lens.place(place - face.lens.origin);
+                looks.look(i, face, x, y, ahead);
             }
         }
         looks

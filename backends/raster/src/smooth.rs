@@ -7,7 +7,7 @@
 //! The places are J. M. Hammersley's points (*Monte Carlo methods for solving multivariable problems*, Annals of the
 //! New York Academy of Sciences 86, 1960): every row and every column of `N` strips holds one.
 
-use crate::batch::{Batch, at};
+use crate::batch::Batch;
 use crate::bin::Bins;
 use crate::layers::{Fragment, collect, sort};
 use crate::paint::{LAYER, OPAQUE, Painter, Scratch, finite};
@@ -15,7 +15,6 @@ use crate::setup::STEPS;
 use crate::tile::{NO_TRIANGLE, TILE_PIXELS, TILE_WIDTH, TileArea, TileBuffer};
 use glam::Vec3;
 use polyptych_core::framebuffer::Band;
-use polyptych_core::lanes::LANES;
 
 /// Most places: beyond, steps of a 256th of a pixel would lie too close together.
 pub(crate) const MOST: u32 = 256;
@@ -175,9 +174,9 @@ impl<'a> Painter<'a> {
                         break;
                     }
                     sample -= 1;
-                    looks[k] = (at!(batch.lit, sample), batch.opacity[sample]);
+                    looks[k] = (batch.lit.get(sample), batch.opacity[sample]);
                 }
-                batch.count = 0;
+                batch.clear();
                 if faces.is_full() {
                     faces.clear();
                     corners.clear();
