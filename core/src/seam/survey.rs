@@ -118,7 +118,7 @@ mod tests {
         scene.objects = vec![wall(0.0), wall(-1.0), wall(-2.0)];
         scene.objects[2].visible = false;
         let view = Projection::Orthographic { height: 4.0 };
-        let camera = Camera::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, view);
+        let camera = Camera::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, view.clone());
         let survey = Survey::of(&scene, &Need::new(camera, 480, 480));
         let expected = [0.25, 0.025, 0.0];
         for (tested, expected) in survey.tested.iter().zip(expected) {
@@ -127,7 +127,8 @@ mod tests {
         assert!((survey.entered - 0.25).abs() < 1e-9 && (survey.seen - 0.2475).abs() < 1e-9, "{survey:?}");
         assert!((survey.length[0] - 0.1).abs() < 1e-9);
         assert!((survey.sum(&scene, |i, _| if i == 0 { 4.0 } else { 0.0 }) - 1.0).abs() < 1e-9);
-        let nothing = Survey::of(&Scene::default(), &Need::new(Camera::default(), 0, 0));
+        let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view);
+        let nothing = Survey::of(&Scene::default(), &Need::new(camera, 0, 0));
         assert_eq!((nothing.entered, nothing.seen), (0.0, 0.0));
     }
 }
