@@ -504,7 +504,15 @@ mod tests {
             (Shape::Primitive(Primitive::Box { size: DVec3::ONE }), 0.0),
             (Shape::Primitive(Primitive::Plane { width: 1.0, depth: 2.0 }), 0.0),
             (Shape::Primitive(Primitive::prism(7, 1.0, 2.0)), 0.0),
-            (Shape::Primitive(Primitive::Frustum { sides: 5, lower_radius: 0.8, upper_radius: 0.0, height: 2.0 }), 0.0),
+            (
+                Shape::Primitive(Primitive::Frustum {
+                    sides: 5,
+                    lower_radius: 0.8,
+                    upper_radius: 0.0,
+                    height: 2.0,
+                }),
+                0.0,
+            ),
             (
                 Shape::HeightField(
                     crate::scene::HeightField::new(24, 17, glam::DVec2::ONE, heights).unwrap(),
