@@ -9,7 +9,7 @@ use crate::info::{Mode, Options, info};
 use crate::lens::Lens;
 use crate::light::{Illumination, Lamp};
 use crate::lines::Lines;
-use crate::model::{Model, Role, Source};
+use crate::model::{Model, Part, Role, Source};
 use crate::paint::{self, Announce, Look, Painter};
 use crate::plan::plan;
 use crate::shadow::{Before, MapSizes, Shadows};
@@ -75,6 +75,8 @@ struct Ready {
     /// The same for cameras that bend straight lines.
     decisions_resampled: Arc<[Decision]>,
     as_drawn: OnceLock<Option<Arc<Scene>>>,
+    /// Bytes of what was converted.
+    triangle_bytes: u64,
 }
 
 /// Buffers that live from frame to frame.
@@ -224,6 +226,7 @@ impl Renderer for Raster {
         let kept = before.as_ref().filter(|b| Arc::ptr_eq(&b.model, &model)).and_then(|b| b.lines.clone());
         let lines = options.mode.draws_lines().then(|| kept.unwrap_or_else(|| Arc::new(Lines::of(&model))));
         let mut ready = Ready {
+            triangle_bytes: triangle_bytes(&model),
             scene: scene.clone(),
             model,
             given,
@@ -292,6 +295,16 @@ impl Renderer for Raster {
             bytes: ready.bytes() + self.scratch.bytes(),
         })
     }
+}
+
+/// Returns the bytes of all converted triangles; objects of one shape share theirs.
+fn triangle_bytes(model: &Model) -> u64 {
+    let mut seen = std::collections::HashSet::new();
+    let of = |part: &Part| match &part.source {
+        Source::Converted(m) if seen.insert(Arc::as_ptr(m)) => m.mesh.bytes(),
+        _ => 0,
+    };
+    model.parts.iter().map(of).sum()
 }
 
 /// What a frame took.
@@ -427,13 +440,7 @@ impl Ready {
     }
 
     fn bytes(&self) -> u64 {
-        // Objects of one shape share its triangles.
-        let mut seen = std::collections::HashSet::new();
-        let mut converted = |s: &Source| match s {
-            Source::Converted(m) if seen.insert(Arc::as_ptr(m)) => m.mesh.bytes(),
-            _ => 0,
-        };
-        self.model.parts.iter().map(|p| converted(&p.source)).sum::<u64>()
+        self.triangle_bytes
             + self.shadows.as_ref().or(self.resting_shadows.as_ref()).map_or(0, |s| s.bytes())
             + self.lines.as_ref().map_or(0, |lines| lines.bytes())
     }
