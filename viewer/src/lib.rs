@@ -10,6 +10,7 @@
 //!  painter    one worker thread a pane: prepares, draws coarse then fine, drops what is out of date
 //!  navigation the camera that all panes share: orbit, pan, dolly, fly
 //!  pane       a picture with its name, time and decisions
+//!  scene_panel the things of the scene and their fields; history undoes what they change
 //!  settings   the panel of a back end, made from its declared parameters
 //!  difference where two pictures differ, and by how much
 //!  probe      the values of all pictures at one place
@@ -20,12 +21,14 @@
 //! Nothing that takes long runs on the window's own thread: it only shows what the painters have finished.
 
 mod difference;
+mod history;
 mod loading;
 mod modes;
 mod navigation;
 mod painter;
 mod pane;
 mod probe;
+mod scene_panel;
 mod settings;
 mod viewer;
 

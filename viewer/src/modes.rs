@@ -63,6 +63,9 @@ impl Viewer {
             ui.painter().rect_stroke(picture, 0.0, stroke, egui::StrokeKind::Outside);
         }
         self.point_at(ui, picture, &response);
+        if response.clicked() {
+            self.choose_at(index);
+        }
         changed | self.navigation.follow(ui, &response)
     }
 
@@ -72,6 +75,7 @@ impl Viewer {
         let (scene, lists) = (self.scene.clone(), (&self.backends[..], &self.refused[..]));
         let (pane, shows_error) = (&mut self.panes[index], self.truth.is_some());
         let header = ui.scope_builder(egui::UiBuilder::new().max_rect(cell), |ui| {
+            ui.shrink_clip_rect(cell);
             changed |= pane.header(ui, lists, index, &scene, shows_error);
         });
         (header.response.rect.bottom() + 2.0, changed)

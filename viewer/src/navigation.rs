@@ -32,6 +32,11 @@ impl Navigation {
         Self { camera, pivot, bounds }
     }
 
+    /// Returns what the camera turns around.
+    pub(crate) fn pivot(&self) -> DVec3 {
+        self.pivot
+    }
+
     /// Turns the camera around the pivot, by radians: to the right, and up.
     pub(crate) fn orbit(&mut self, right: f64, up: f64) {
         let turn = DQuat::from_axis_angle(DVec3::Y, -right)

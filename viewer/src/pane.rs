@@ -95,7 +95,8 @@ impl Pane {
         shows_error: bool,
     ) -> bool {
         let before = (self.backend.clone(), self.channel);
-        ui.horizontal_wrapped(|ui| {
+        // On one line: pictures of panes with headers of different heights would have different sizes.
+        ui.horizontal(|ui| {
             let chosen = egui::ComboBox::from_id_salt(("back end", number))
                 .selected_text(&self.backend)
                 .show_ui(ui, |ui| {
@@ -122,10 +123,11 @@ impl Pane {
                 status.on_hover_text(format!("prepared in {:.1} ms", painting.prepare.as_secs_f64() * 1e3));
             }
             if let Some(error) = self.error.summary().filter(|_| shows_error) {
-                ui.label(error).on_hover_text(
-                    "Against the exact reference: peak signal-to-noise ratio of the color, pixels off edges that \
-                     show the same object, and the mean error of the distance over the distance.",
-                );
+                let first = error.split(", ").next().unwrap_or_default().to_owned();
+                ui.label(first).on_hover_text(format!(
+                    "Against the exact reference: {error}. (Peak signal-to-noise ratio of the color; pixels off edges \
+                     that show the same object; mean error of the distance over the distance.)"
+                ));
             }
             self.badge(ui, number, scene);
         });
@@ -144,7 +146,7 @@ impl Pane {
         if other.is_empty() {
             return;
         }
-        let text = format!("{} of {} objects not as given", other.len(), scene.objects.len());
+        let text = format!("{} of {} not as given", other.len(), scene.objects.len());
         ui.push_id(("decisions", number), |ui| {
             ui.menu_button(text, |ui| {
                 egui::ScrollArea::vertical().max_height(300.0).show(ui, |ui| {

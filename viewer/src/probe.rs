@@ -4,11 +4,21 @@ use polyptych::framebuffer::{Channel, Framebuffer};
 use polyptych::picture::displayed;
 use polyptych::scene::Scene;
 
-/// Returns the values of all channels that a picture has at a place, given as shares of its width and height.
-pub(crate) fn values(picture: &Framebuffer, scene: &Scene, place: [f32; 2]) -> Vec<(Channel, String)> {
+/// Returns the id of what a picture shows at a place, if it has ids and shows something there.
+pub(crate) fn id_at(picture: &Framebuffer, place: [f32; 2]) -> Option<u32> {
+    picture.id().get(index(picture, place)).copied().filter(|id| *id != 0)
+}
+
+/// Returns the index of the pixel at a place, given as shares of width and height.
+fn index(picture: &Framebuffer, place: [f32; 2]) -> usize {
     let [x, y] = [(place[0], picture.width()), (place[1], picture.height())]
         .map(|(share, size)| ((share * size as f32) as u32).min(size.saturating_sub(1)));
-    let at = y as usize * picture.width() as usize + x as usize;
+    y as usize * picture.width() as usize + x as usize
+}
+
+/// Returns the values of all channels that a picture has at a place, given as shares of its width and height.
+pub(crate) fn values(picture: &Framebuffer, scene: &Scene, place: [f32; 2]) -> Vec<(Channel, String)> {
+    let at = index(picture, place);
     let vector = |v: glam::Vec3| format!("{:.3} {:.3} {:.3}", v.x, v.y, v.z);
     let of = |channel: Channel| -> Option<String> {
         Some(match channel {

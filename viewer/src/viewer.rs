@@ -2,12 +2,14 @@
 
 use crate::ViewerError;
 use crate::difference::Comparer;
+use crate::history::History;
 use crate::loading::Loading;
 use crate::modes::Mode;
 use crate::navigation::Navigation;
 use crate::painter::{Order, Painter};
 use crate::pane::Pane;
-use crate::{probe, settings};
+use crate::scene_panel::Chosen;
+use crate::{probe, scene_panel, settings};
 use eframe::egui::{self, Key};
 use polyptych::convert::Converter;
 use polyptych::framebuffer::{Channel, Channels};
@@ -44,6 +46,10 @@ pub struct Viewer {
     loading: Option<Loading>,
     message: String,
     shows_settings: bool,
+    shows_scene: bool,
+    /// What is chosen in the scene.
+    pub(crate) chosen: Option<Chosen>,
+    history: History,
     /// Whether the values of all panes are listed for the place under the mouse.
     pub(crate) shows_values: bool,
     /// That place, as shares of a picture's width and height.
@@ -84,6 +90,9 @@ impl Viewer {
             loading: None,
             message: String::new(),
             shows_settings: false,
+            shows_scene: false,
+            chosen: None,
+            history: History::default(),
             shows_values: false,
             pointed: None,
             difference: Comparer::default(),
@@ -171,6 +180,9 @@ impl Viewer {
         let mut changed = self.take_scene();
         changed |= self.take_keys(&ctx);
         changed |= self.show_bar(ui, &ctx);
+        if self.shows_scene {
+            changed |= self.show_scene(ui);
+        }
         if self.shows_settings {
             changed |= self.show_settings(ui);
         }
@@ -276,7 +288,11 @@ impl Viewer {
         }
         let settings = self.settings(&pane.backend);
         let held_together = self.shows_values || self.truth.is_some() || self.mode == Mode::Difference;
-        let channels = if held_together { Channels::ALL } else { Channels::of(&[pane.channel]) };
+        let mut channels = if held_together { Channels::ALL } else { Channels::of(&[pane.channel]) };
+        if self.shows_scene {
+            // A click chooses what is there.
+            channels = channels.with(Channel::Id);
+        }
         let need = Need { settings, channels, ..Need::new(self.navigation.camera.clone(), width, height) };
         pane.painter.order(Order {
             backend: pane.backend.clone(),
@@ -303,6 +319,7 @@ impl Viewer {
                 self.navigation = Navigation::new(scene.cameras[0].1.clone(), scene.bounds());
                 self.message = format!("{}: {} objects", scene.name, scene.objects.len());
                 self.scene = Arc::new(scene);
+                (self.chosen, self.history) = (None, History::default());
                 true
             }
             Err(why) => {
@@ -358,6 +375,9 @@ impl Viewer {
             pane.channel = Channel::ALL[(at + 1) % Channel::ALL.len()];
             changed = true;
         }
+        let pressed = |key: Key| ctx.input_mut(|i| i.consume_key(egui::Modifiers::COMMAND, key));
+        let (undo, redo) = (pressed(Key::Z), pressed(Key::Y));
+        changed |= self.step_back(undo) | self.step_forward(redo);
         for (key, mode) in [(Key::X, Mode::Wipe), (Key::Z, Mode::Flip), (Key::G, Mode::Difference)] {
             if ctx.input(|i| i.key_pressed(key)) {
                 self.mode = if self.mode == mode { Mode::SideBySide } else { mode };
@@ -404,6 +424,7 @@ impl Viewer {
                     changed |= ui.selectable_value(&mut self.mode, mode, name).changed();
                 }
                 ui.separator();
+                changed |= ui.toggle_value(&mut self.shows_scene, "Objects").changed();
                 ui.toggle_value(&mut self.shows_settings, "Settings");
                 changed |= ui.toggle_value(&mut self.shows_values, "Values").changed();
                 let mut wanted = self.truth.is_some();
@@ -420,6 +441,47 @@ impl Viewer {
             );
         });
         changed
+    }
+
+    /// Shows what is in the scene. Tells whether it was changed.
+    fn show_scene(&mut self, ui: &mut egui::Ui) -> bool {
+        let center = self.navigation.pivot();
+        let panel = egui::Panel::left("scene").exact_size(270.0).show(ui, |ui| {
+            let step = ui.horizontal(|ui| {
+                let [undo, redo] = self.history.can();
+                let undo = ui.add_enabled(undo, egui::Button::new("Undo")).on_hover_text("Ctrl-Z").clicked();
+                let redo = ui.add_enabled(redo, egui::Button::new("Redo")).on_hover_text("Ctrl-Y").clicked();
+                (undo, redo)
+            });
+            (step.inner, scene_panel::show(ui, &self.scene, &mut self.chosen, center))
+        });
+        let ((undo, redo), edit) = panel.inner;
+        if let Some(edit) = edit {
+            self.history.keep(&self.scene, &edit.what, ui.input(|i| i.time));
+            self.scene = Arc::new(edit.scene);
+            return true;
+        }
+        self.step_back(undo) | self.step_forward(redo)
+    }
+
+    fn step_back(&mut self, wanted: bool) -> bool {
+        let scene = wanted.then(|| self.history.undo(&self.scene)).flatten();
+        scene.map(|scene| self.scene = scene).is_some()
+    }
+
+    fn step_forward(&mut self, wanted: bool) -> bool {
+        let scene = wanted.then(|| self.history.redo(&self.scene)).flatten();
+        scene.map(|scene| self.scene = scene).is_some()
+    }
+
+    /// Chooses what a picture shows at the place under the mouse.
+    pub(crate) fn choose_at(&mut self, pane: usize) {
+        let (Some([x, y]), Some(painting)) = (self.pointed, self.panes.get(pane).and_then(Pane::painting))
+        else {
+            return;
+        };
+        let id = probe::id_at(&painting.framebuffer, [x, y]);
+        self.chosen = id.map(|id| Chosen::Object(id as usize - 1));
     }
 
     /// Shows the parameters of the active pane's back end. Tells whether one was changed.
