@@ -340,7 +340,7 @@ fn decisions_say_what_happens_to_each_object() {
     scene.objects[3].required = true;
     let error =
         Voxel::new().prepare(&Arc::new(scene), &need, &Converter::default(), &Control::simple()).unwrap_err();
-    assert_eq!(error.to_string(), "object `wire` is required but line segments fill no voxels");
+    assert_eq!(error.to_string(), "object `wire` is required but line segments have no area");
 }
 
 #[test]
