@@ -37,7 +37,7 @@ impl Pace {
     /// # Errors
     /// When a back end cannot draw the built-in scenes.
     pub fn of_this_machine(registry: &Registry) -> Result<Self, StudioError> {
-        if let Some(pace) = cache().and_then(|path| Self::kept(&path, registry)) {
+        if let Some(pace) = Self::known(registry) {
             return Ok(pace);
         }
         let pace = Self::measured(registry)?;
@@ -47,6 +47,12 @@ impl Pace {
             let _ = folder.and_then(|()| crate::picture::write_whole(&path, text.as_bytes()));
         }
         Ok(pace)
+    }
+
+    /// Returns what was measured before; nothing where that is still to be done, which takes some seconds.
+    #[must_use]
+    pub fn known(registry: &Registry) -> Option<Self> {
+        cache().and_then(|path| Self::kept(&path, registry))
     }
 
     /// Draws the built-in scenes with every built-in back end on one thread; the factor is the mean of theirs, as they

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn polyptych(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_polyptych")).args(arguments).output().expect("the command starts")
+    let mut command = Command::new(env!("CARGO_BIN_EXE_polyptych"));
+    // What it keeps of this machine is no matter of the user's.
+    command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
+    command.args(arguments).output().expect("the command starts")
 }
 
 /// Makes an empty folder for a test.

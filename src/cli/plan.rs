@@ -14,6 +14,9 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let mut settings = input::settings(&arguments.draw, studio.registry(), &backends)?;
     let base = input::need(&arguments.draw, &scene)?;
     // Times are those of this machine; how fast it is was measured before, or is now, once.
+    if !arguments.draw.quiet && Pace::known(studio.registry()).is_none() {
+        eprintln!("measures how fast this machine is, once: some seconds");
+    }
     let pace = Pace::of_this_machine(studio.registry()).map_err(Failure::running)?;
     let mut all = Vec::new();
     for backend in &backends {
