@@ -159,7 +159,8 @@ impl Count {
 /// and of the bytes held, whichever is largest. What costs next to nothing counts as if it cost a little.
 fn growth(studio: &mut Studio, trial: &Trial<'_>) -> Result<Drawn, StudioError> {
     const LEAST_MS: f64 = 2.0;
-    const LEAST_BYTES: f64 = 65_536.0;
+    // A shadow map more or less is no growth.
+    const LEAST_BYTES: f64 = 33_554_432.0;
     let mut cost = |setup: &Setup| -> Result<([f64; 3], Framebuffer, f64), StudioError> {
         let (first, ms, prepare_ms, bytes) = draw_measured(studio, trial.backend, setup)?;
         let (mut picture, mut best) = (first, ms);

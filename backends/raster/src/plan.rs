@@ -22,6 +22,8 @@ mod nanoseconds {
     pub(super) const PIXEL: f64 = 8.0;
     /// A pixel of a surface, resolved.
     pub(super) const SURFACE: f64 = 30.0;
+    /// A pixel of what lets light through.
+    pub(super) const LAYER: f64 = 120.0;
     /// What a texture adds to that.
     pub(super) const TEXEL: f64 = 40.0;
     /// A light on a surface.
@@ -88,15 +90,17 @@ pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
 }
 
 fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, amount: &Amount, samples: u32) -> f64 {
-    use nanoseconds::{LIGHT, PIXEL, SHADOW, SURFACE, TEXEL, TRIANGLE, VERTEX};
-    let seen = Survey::of(scene, need).seen;
+    use nanoseconds::{LAYER, LIGHT, PIXEL, SHADOW, SURFACE, TEXEL, TRIANGLE, VERTEX};
+    let survey = Survey::of(scene, need);
+    let seen = survey.seen;
+    let layers = survey.sum(scene, |_, o| if scene.material(o, 0).is_see_through() { LAYER } else { 0.0 });
     let texture = if demand.textures.is_some() { TEXEL } else { 0.0 };
     let lights = demand.shadows.len() as f64 * LIGHT + demand.shadow_count() as f64 * SHADOW;
     let shading = if demand.shading { texture + lights } else { 0.0 };
     let pixels = f64::from(need.width) * f64::from(need.height);
     // Visibility is found at every sample, a triangle shaded once in a pixel.
     let triangles = amount.triangles * TRIANGLE * f64::from(samples).sqrt();
-    let of_pixel = PIXEL * f64::from(samples) + seen * (SURFACE + shading);
+    let of_pixel = PIXEL * f64::from(samples) + layers + seen * (SURFACE + shading);
     (amount.vertices * VERTEX + triangles + pixels * of_pixel) * 1e-6
 }
 

@@ -209,7 +209,7 @@ impl Renderer for Stylized {
         });
         // Nanoseconds that a pixel of the background and one of a surface take for tone and lines, on the machine that
         // all back ends' constants were measured on.
-        let per_pixel = 8.0 + 25.0 * Survey::of(scene, need).seen;
+        let per_pixel = 8.0 + 35.0 * Survey::of(scene, need).seen;
         plan.estimated_ms += f64::from(need.width) * f64::from(need.height) * per_pixel * 1e-6;
         plan
     }

@@ -6,7 +6,7 @@ use crate::occupancy::Occupancy;
 use crate::trace::Shadows;
 use crate::world::World;
 use polyptych_core::convert::Converter;
-use polyptych_core::scene::{AlphaMode, CHUNK, Chunk, Object, Scene, Shape, Volume, Voxels};
+use polyptych_core::scene::{AlphaMode, CHUNK, Chunk, Object, Scene, Shape, Voxels};
 use polyptych_core::seam::{Decision, Demand, Need, ObjectPlan, PassPlan, Plan, Surfaces, Survey};
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -18,8 +18,8 @@ mod nanoseconds {
     /// A ray into a grid, and each doubling of its cells.
     pub(super) const GRID: f64 = 10.0;
     pub(super) const DOUBLING: f64 = 14.0;
-    /// How much longer a ray walks through what was a cloud.
-    pub(super) const RAGGED: f64 = 6.0;
+    /// How much longer a ray walks through what it does not end in.
+    pub(super) const CLEAR: f64 = 6.0;
     /// A surface, lit.
     pub(super) const SURFACE: f64 = 70.0;
     /// A light on it.
@@ -54,12 +54,12 @@ pub(crate) fn plan(scene: &Scene, need: &Need, resolution: u32, shadows: Shadows
 
 /// `cells` are those along the longest edge of each object's grid.
 fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, cells: &[f64]) -> f64 {
-    use nanoseconds::{DOUBLING, GRID, LIGHT, PIXEL, RAGGED, SURFACE};
+    use nanoseconds::{CLEAR, DOUBLING, GRID, LIGHT, PIXEL, SURFACE};
     let survey = Survey::of(scene, need);
     let walks = survey.sum(scene, |i, object| {
         // Through what is not opaque a ray goes on.
-        let clear = |v: &Volume| v.transfer.points.iter().all(|p| p.opacity < 1.0);
-        let ragged = if matches!(&*object.shape, Shape::Volume(v) if clear(v)) { RAGGED } else { 1.0 };
+        let is_clear = scene.material(object, 0).is_see_through();
+        let ragged = if is_clear && !matches!(&*object.shape, Shape::Voxels(_)) { CLEAR } else { 1.0 };
         (GRID + DOUBLING * cells[i].max(1.0).log2()) * ragged
     });
     // A shadow ray passes what a ray of the picture passes, where there is anything.
