@@ -1,11 +1,12 @@
 //! The seam: an inner back end for visibility, and the style laid over it.
 
-use crate::contour::Contours;
+use crate::contour::{Contours, shows_nothing};
 use crate::tone::Tone;
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::{RowDirections, View};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer};
+use polyptych_core::lanes::LANES;
 use polyptych_core::parallel::for_each_mut;
 use polyptych_core::scene::{Light, LightKind, Scene};
 use polyptych_core::seam::{
@@ -360,10 +361,15 @@ impl Painting<'_> {
             if let Some(directions) = directions {
                 directions.fill(&self.scene.environment.background, 0, line);
             }
-            for (x, color) in line.iter_mut().enumerate() {
-                let id = self.visible.id()[(y * band.width) as usize + x];
-                if id != 0 || directions.is_none() {
-                    *color = self.pixel(x as u32, y, directions.as_ref());
+            let ids = &self.visible.id()[(y * band.width) as usize..][..band.width as usize];
+            for (piece, (ids, colors)) in ids.chunks(LANES).zip(line.chunks_mut(LANES)).enumerate() {
+                if directions.is_some() && shows_nothing(ids) {
+                    continue;
+                }
+                for (lane, (id, color)) in ids.iter().zip(colors).enumerate() {
+                    if *id != 0 || directions.is_none() {
+                        *color = self.pixel((piece * LANES + lane) as u32, y, directions.as_ref());
+                    }
                 }
             }
             if self.style.contours.drawn {
@@ -417,8 +423,13 @@ impl Painting<'_> {
         for (piece, colors) in colors.chunks_mut(PIECE).enumerate() {
             let mut coverage = [0.0f32; PIECE];
             let coverage = &mut coverage[..colors.len()];
+            let mut touched = false;
             for row in rows.clone() {
-                contours.splat_row(&self.edges[row as usize], row as f32 - y as f32, piece * PIECE, coverage);
+                let edges = &self.edges[row as usize];
+                touched |= contours.splat_row(edges, row as f32 - y as f32, piece * PIECE, coverage);
+            }
+            if !touched {
+                continue;
             }
             for (color, &cover) in colors.iter_mut().zip(&*coverage) {
                 if cover > 0.0 {
