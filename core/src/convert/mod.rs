@@ -5,6 +5,7 @@
 //! the body's size, so that a scene in other units becomes the same picture; a result is kept under (shape, class)
 //! as long as the shape lives, and shared by all who ask again.
 
+mod cache;
 mod distance;
 mod field_mesh;
 mod height_mesh;
@@ -16,9 +17,9 @@ mod voxelize;
 use crate::math::Aabb;
 use crate::parallel::Threads;
 use crate::scene::{Material, Mesh, Object, Scene, Shape, Voxels};
+use cache::Cache;
 use glam::{DAffine3, DVec3};
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::Arc;
 
 /// Converts shapes and keeps the results for all back ends.
 #[derive(Default)]
@@ -374,89 +375,6 @@ fn filled_bounds(voxels: &Voxels) -> Aabb {
 /// Tells for each palette byte whether light passes through.
 fn clear_values(scene: &Scene, object: &Object) -> [bool; 256] {
     std::array::from_fn(|v| v == 0 || scene.material(object, v - 1).is_see_through())
-}
-
-/// Results by shape, class and the materials that went into them.
-struct Cache<T> {
-    entries: Mutex<HashMap<Key, Vec<Entry<T>>>>,
-}
-
-/// Address of the shape, class of the tolerance, and resolution.
-type Key = (usize, i32, u32);
-
-struct Entry<T> {
-    /// Keeps the address of the shape from being used again while the entry stands.
-    shape: Weak<Shape>,
-    scale: DAffine3,
-    materials: Vec<Material>,
-    model: Arc<T>,
-}
-
-impl<T> Default for Cache<T> {
-    fn default() -> Self {
-        Self { entries: Mutex::new(HashMap::new()) }
-    }
-}
-
-impl<T> Cache<T> {
-    fn key(object: &Object, detail: Detail) -> Key {
-        (Arc::as_ptr(&object.shape) as usize, detail.class(object), detail.max_resolution)
-    }
-
-    fn count(&self) -> usize {
-        let entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
-        entries.values().map(Vec::len).sum()
-    }
-
-    fn find(&self, scene: &Scene, object: &Object, detail: Detail) -> Option<Arc<T>> {
-        let entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
-        entries
-            .get(&Self::key(object, detail))?
-            .iter()
-            .find(|e| e.fits(scene, object))
-            .map(|e| e.model.clone())
-    }
-
-    /// Finds a result or makes it; results of shapes that are gone are dropped.
-    fn get(
-        &self,
-        scene: &Scene,
-        object: &Object,
-        detail: Detail,
-        make: impl FnOnce(f64) -> Result<T, ConvertError>,
-    ) -> Result<Arc<T>, ConvertError> {
-        if let Some(model) = self.find(scene, object, detail) {
-            return Ok(model);
-        }
-        if let Some(reason) = object.why_undrawable() {
-            return Err(ConvertError { object: object.name.clone(), reason: reason.to_owned() });
-        }
-        let model = Arc::new(make(detail.in_object(object))?);
-        let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
-        entries.retain(|_, list| {
-            list.retain(|e| e.shape.strong_count() > 0);
-            !list.is_empty()
-        });
-        entries.entry(Self::key(object, detail)).or_default().push(Entry {
-            shape: Arc::downgrade(&object.shape),
-            scale: object.world_from_object,
-            materials: object_materials(scene, object),
-            model: model.clone(),
-        });
-        Ok(model)
-    }
-}
-
-impl<T> Entry<T> {
-    fn fits(&self, scene: &Scene, object: &Object) -> bool {
-        self.scale.matrix3 == object.world_from_object.matrix3
-            && self.materials.len() == object.materials.len()
-            && self.materials.iter().enumerate().all(|(slot, m)| m == scene.material(object, slot))
-    }
-}
-
-fn object_materials(scene: &Scene, object: &Object) -> Vec<Material> {
-    (0..object.materials.len()).map(|slot| scene.material(object, slot).clone()).collect()
 }
 
 #[cfg(test)]
