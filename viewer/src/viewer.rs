@@ -446,7 +446,7 @@ impl Viewer {
     /// Shows what is in the scene. Tells whether it was changed.
     fn show_scene(&mut self, ui: &mut egui::Ui) -> bool {
         let center = self.navigation.pivot();
-        let panel = egui::Panel::left("scene").exact_size(270.0).show(ui, |ui| {
+        let panel = egui::Panel::left("scene").exact_size(310.0).show(ui, |ui| {
             let step = ui.horizontal(|ui| {
                 let [undo, redo] = self.history.can();
                 let undo = ui.add_enabled(undo, egui::Button::new("Undo")).on_hover_text("Ctrl-Z").clicked();
