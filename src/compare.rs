@@ -95,7 +95,7 @@ impl Comparison {
 }
 
 /// Channels of a comparison.
-fn compared_channels() -> Channels {
+pub(crate) fn compared_channels() -> Channels {
     Channels::of(&[
         Channel::Color,
         Channel::Distance,

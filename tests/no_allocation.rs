@@ -32,10 +32,15 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-fn asked_for_in_a_second_frame(backend: &str) -> u64 {
+fn asked_for_in_a_second_frame(backend: &str, settings: &[(&str, &str)]) -> u64 {
     let scene = common::builtin("atelier");
-    let need = Need { tolerance_px: 2.0, ..common::need(&scene, 96, 54) };
-    let mut renderer = Registry::builtin().create(backend).expect("a built-in back end");
+    let mut need = Need { tolerance_px: 2.0, ..common::need(&scene, 96, 54) };
+    let registry = Registry::builtin();
+    for (name, value) in settings {
+        let declared = &registry.info(backend).expect("a built-in back end").parameters;
+        need.settings.set(backend, declared, name, value).expect("a parameter");
+    }
+    let mut renderer = registry.create(backend).expect("a built-in back end");
     let control = Control::simple();
     renderer.prepare(&scene, &need, &Converter::default(), &control).expect("the scene is prepared");
     let mut target = Framebuffer::new(96, 54, need.channels);
@@ -49,6 +54,14 @@ fn asked_for_in_a_second_frame(backend: &str) -> u64 {
 #[test]
 fn no_back_end_asks_for_memory_in_a_second_frame() {
     for backend in ["reference", "raster", "voxel", "freeform", "stylized"] {
-        assert_eq!(asked_for_in_a_second_frame(backend), 0, "{backend}");
+        assert_eq!(asked_for_in_a_second_frame(backend, &[]), 0, "{backend}");
+    }
+}
+
+#[test]
+fn no_way_to_draw_triangles_asks_for_memory_in_a_second_frame() {
+    for setting in [("mode", "hidden-line"), ("mode", "wireframe"), ("shading", "gouraud"), ("samples", "4")]
+    {
+        assert_eq!(asked_for_in_a_second_frame("raster", &[setting]), 0, "{setting:?}");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::builtin;
 use crate::camera::{Camera, Projection};
-use crate::framebuffer::{Channel, Channels};
+use crate::compare::compared_channels;
 use crate::prelude::{
     DAffine3, DQuat, DVec2, DVec3, Form, FreeForm, HeightField, Light, Material, Mesh, Need, Object,
     Primitive, Scene, Shape, Vec3, Voxels,
@@ -36,14 +36,7 @@ pub(super) const WIDTH: u32 = 96;
 pub(super) const HEIGHT: u32 = 72;
 
 pub(super) fn setup(scene: Scene, camera: Camera) -> Setup {
-    let channels = Channels::of(&[
-        Channel::Color,
-        Channel::Distance,
-        Channel::Normal,
-        Channel::Id,
-        Channel::Albedo,
-        Channel::Shadow,
-    ]);
+    let channels = compared_channels();
     let distance = camera.eye.distance(scene.bounds().center());
     Setup {
         scene: Arc::new(scene),

@@ -8,19 +8,18 @@ use crate::lens::Lens;
 use crate::model::Model;
 use crate::tile::NO_TRIANGLE;
 use polyptych_core::scene::Scene;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The triangles that a picture shows, in rows of bands.
+/// The triangles that a picture shows, row by row.
 pub(crate) struct Seen<'a> {
-    /// Band by band.
-    pub(crate) bands: Vec<&'a [u32]>,
-    pub(crate) rows: u32,
+    pub(crate) triangles: &'a [AtomicU32],
     pub(crate) width: u32,
     pub(crate) height: u32,
 }
 
 impl Seen<'_> {
     fn at(&self, x: u32, y: u32) -> u32 {
-        self.bands[(y / self.rows) as usize][(y % self.rows * self.width + x) as usize]
+        self.triangles[(y * self.width + x) as usize].load(Ordering::Relaxed)
     }
 
     /// Returns which share of a pixel intersection lines take, and the part whose color they have.

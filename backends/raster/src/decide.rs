@@ -27,7 +27,8 @@ pub(crate) fn demand(scene: &Scene, need: &Need, lamps: &[Lamp], options: Option
 
 /// Says why an object is not drawn, if that is so.
 pub(crate) fn why_skipped(object: &Object, draws_lines: bool) -> Option<String> {
-    let has_lines = matches!(&*object.shape, Shape::Mesh(mesh) if !mesh.segments.is_empty());
+    let has_lines =
+        matches!(&*object.shape, Shape::Mesh(m) if m.triangles.is_empty() && !m.segments.is_empty());
     match seam::why_not_drawn(object) {
         Some(_) if has_lines && draws_lines && object.visible => object.why_undrawable().map(str::to_owned),
         Some(why) if has_lines && object.visible => {
@@ -39,12 +40,11 @@ pub(crate) fn why_skipped(object: &Object, draws_lines: bool) -> Option<String> 
 
 /// Says what is lost of an object itself.
 pub(crate) fn losses(scene: &Scene, object: &Object, draws_lines: bool) -> Vec<String> {
-    let mut losses = Vec::new();
-    let mut left_out = seam::left_out(&object.shape);
-    if draws_lines {
-        left_out.retain(|loss| !loss.contains("segments"));
-    }
-    losses.extend(left_out);
+    let mut losses = if draws_lines {
+        seam::broken_triangles(&object.shape).into_iter().collect()
+    } else {
+        seam::left_out(&object.shape)
+    };
     let materials = || (0..object.materials.len().max(1)).map(|slot| scene.material(object, slot));
     if matches!(*object.shape, Shape::Voxels(_)) && materials().any(Material::is_see_through) {
         losses.push("see-through voxels are drawn as their outer faces".to_owned());

@@ -9,7 +9,7 @@ use crate::tile::{TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileArea};
 use glam::Vec3;
 use polyptych_core::framebuffer::{Band, Channel, Framebuffer};
 use polyptych_core::seam::Control;
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::Ordering;
 
 /// A drawing of lines.
 #[derive(Clone, Copy)]
@@ -21,25 +21,14 @@ pub(crate) struct Drawing<'a> {
 }
 
 impl Painter<'_> {
-    /// Tells whether lines are drawn that surfaces hide.
-    pub(crate) fn hides_lines(&self) -> bool {
-        self.drawing.is_some_and(|drawing| drawing.hides)
-    }
-
     /// Draws the lines at which bodies cross each other over a picture whose visible lines are drawn, if the mode
     /// shows them.
-    pub(crate) fn paint_crossings(
-        &self,
-        target: &mut Framebuffer,
-        scratch: &mut [Mutex<Scratch>],
-        control: &Control<'_>,
-    ) -> bool {
-        let size = (target.width(), target.height());
-        if !(self.hides_lines() && self.channels.has(Channel::Color)) {
+    pub(crate) fn paint_crossings(&self, target: &mut Framebuffer, control: &Control<'_>) -> bool {
+        let (width, height) = (target.width(), target.height());
+        let Some(drawing) = self.drawing.filter(|d| d.hides && self.channels.has(Channel::Color)) else {
             return false;
-        }
-        let bands = scratch.iter_mut().map(|s| &*s.get_mut().unwrap_or_else(PoisonError::into_inner).seen);
-        let seen = Seen { bands: bands.collect(), rows: TILE_HEIGHT, width: size.0, height: size.1 };
+        };
+        let seen = Seen { triangles: &drawing.strokes.seen, width, height };
         let Illumination { scene, model, .. } = self.light;
         target.for_each_band(control.threads, TILE_HEIGHT, &|band| {
             for i in 0..band.width * band.rows {
@@ -75,15 +64,19 @@ impl Painter<'_> {
         let place = |pixel: usize| (pixel as u32 % TILE_WIDTH, pixel as u32 / TILE_WIDTH);
         let index = |(x, y): (u32, u32)| (y * band.width + area.x as u32 + x) as usize;
         if drawing.hides {
-            for y in 0..area.height as u32 {
-                let (from, to) = ((y * TILE_WIDTH) as usize, index((0, y)));
-                scratch.seen[to..][..area.width as usize]
-                    .copy_from_slice(&seen[from..][..area.width as usize]);
+            for (y, row) in (0..area.height as u32).zip(seen.chunks_exact(TILE_WIDTH as usize)) {
+                let to = (area.y as u32 + y) as usize * band.width as usize + area.x as usize;
+                let places = &drawing.strokes.seen[to..to + area.width as usize];
+                places.iter().zip(row).for_each(|(place, id)| place.store(*id, Ordering::Relaxed));
             }
         }
         let Illumination { scene, model, .. } = self.light;
         let of = (scene, model, self.lens, drawing.lines);
-        let Some(ink) = drawing.strokes.draw(tile, area, seen, of, &mut scratch.faces) else { return };
+        let Scratch { faces, ink, .. } = scratch;
+        if !drawing.strokes.draw(tile, area, seen, of, faces, ink) {
+            return;
+        }
+        let Some(ink) = ink else { return };
         for pixel in (0..TILE_PIXELS).filter(|&pixel| ink.share[pixel] > 0.0) {
             let (at, share, part) = (index(place(pixel)), ink.share[pixel], ink.part[pixel] as usize);
             let slot = ink.slot(pixel, model, drawing.lines);

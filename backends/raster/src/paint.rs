@@ -10,6 +10,7 @@ use crate::layers::{Fragment, collect, sort};
 use crate::lens::Lens;
 use crate::light::{Illumination, Wants};
 use crate::smooth::Smooth;
+use crate::strokes::Ink;
 use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileArea, TileBuffer, TileGrid};
 use glam::Vec3;
 use polyptych_core::camera::RowDirections;
@@ -53,8 +54,7 @@ pub(crate) struct Scratch {
     pub(crate) faces: Faces,
     pub(crate) corners: Gouraud,
     pub(crate) smooth: Smooth,
-    /// The triangles that the band shows, row by row: of drawings whose surfaces hide.
-    pub(crate) seen: Vec<u32>,
+    pub(crate) ink: Option<Box<Ink>>,
 }
 
 impl Scratch {
@@ -64,7 +64,7 @@ impl Scratch {
             + self.faces.bytes()
             + self.corners.bytes()
             + self.smooth.bytes()
-            + self.seen.capacity() * 4
+            + self.ink.as_ref().map_or(0, |_| size_of::<Ink>())
     }
 }
 
@@ -110,10 +110,6 @@ impl<'a> Painter<'a> {
         target.for_each_band(control.threads, TILE_HEIGHT, &|mut band| {
             let row = band.first_row / TILE_HEIGHT;
             let mut scratch = scratch[row as usize].lock().unwrap_or_else(PoisonError::into_inner);
-            if self.hides_lines() {
-                scratch.seen.clear();
-                scratch.seen.resize((band.width * band.rows) as usize, NO_TRIANGLE);
-            }
             for column in 0..grid.columns {
                 if control.is_cancelled() {
                     stopped.store(true, Ordering::Relaxed);

@@ -405,8 +405,9 @@ fn draw(
     bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height).smooth(smooth), control.threads);
     work.triangles += bins.triangles();
     let drawing = ready.lines.as_deref().map(|lines| {
-        strokes.fill(lines, &ready.model, lens, vertices, culls_back, control.threads);
-        Drawing { lines, strokes, hides: ready.options.mode == Mode::HiddenLine }
+        let hides = ready.options.mode == Mode::HiddenLine;
+        strokes.fill(lines, &ready.model, lens, vertices, (culls_back, hides), control.threads);
+        Drawing { lines, strokes, hides }
     });
     work.phases.end("bin");
     // 3. Draw tile by tile: visibility, layers, surfaces and light.
@@ -420,7 +421,7 @@ fn draw(
     let look = Look { shading: ready.options.shading, places: &ready.places, drawing };
     let painter = Painter::new(light, look, lens, bins, target.channels());
     work.shaded += painter.paint(target, bands, announce, control)?;
-    if painter.paint_crossings(target, bands, control) && announce == Announce::Yes {
+    if painter.paint_crossings(target, control) && announce == Announce::Yes {
         control.finished(&target.band());
     }
     work.phases.end("draw");

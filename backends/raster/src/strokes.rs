@@ -15,6 +15,7 @@ use crate::transform::{ScreenVertex, border};
 use glam::DVec2;
 use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::Scene;
+use std::sync::atomic::AtomicU32;
 
 /// How far from a line pixels show something of it.
 const REACH: f64 = 1.0;
@@ -42,6 +43,8 @@ pub(crate) struct Stroke {
 pub(crate) struct Strokes {
     runs: Vec<Bin<Stroke>>,
     used: usize,
+    /// The triangles that the picture shows, row by row, where surfaces hide: written tile by tile.
+    pub(crate) seen: Vec<AtomicU32>,
 }
 
 /// What strokes leave on the pixels of a tile.
@@ -72,9 +75,12 @@ impl Strokes {
         model: &Model,
         lens: &Lens,
         vertices: &[ScreenVertex],
-        culls_back: bool,
+        (culls_back, hides): (bool, bool),
         threads: &dyn Threads,
     ) {
+        if hides {
+            self.seen.resize_with(lens.width as usize * lens.height as usize, AtomicU32::default);
+        }
         let grid = TileGrid::new(lens.width, lens.height);
         self.used = runs_for(lines.count());
         if self.runs.len() < self.used {
@@ -110,10 +116,11 @@ impl Strokes {
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        self.runs.iter().map(Bin::bytes).sum()
+        self.runs.iter().map(Bin::bytes).sum::<u64>() + self.seen.capacity() as u64 * 4
     }
 
-    /// Draws the lines of a tile that its visible triangles do not hide.
+    /// Draws the lines of a tile that its visible triangles do not hide. Tells whether there are any; the memory is
+    /// kept from tile to tile.
     pub(crate) fn draw(
         &self,
         tile: usize,
@@ -121,13 +128,17 @@ impl Strokes {
         seen: &[u32; TILE_PIXELS],
         (scene, model, lens, lines): (&Scene, &Model, &Lens, &Lines),
         faces: &mut Faces,
-    ) -> Option<Box<Ink>> {
-        let mut ink = None;
+        ink: &mut Option<Box<Ink>>,
+    ) -> bool {
+        let mut begun = false;
         for stroke in self.of_tile(tile) {
             let edge = &lines.of_part(stroke.part as usize)[stroke.edge as usize];
             stroke.for_each_pixel(area, |pixel, share, at, depth| {
                 let ahead = lens.ahead(depth);
                 let ink = ink.get_or_insert_with(Ink::none);
+                if !std::mem::replace(&mut begun, true) {
+                    ink.share.fill(0.0);
+                }
                 if ink.has_better(pixel, share, stroke) {
                     return;
                 }
@@ -143,7 +154,7 @@ impl Strokes {
                 }
             });
         }
-        ink
+        begun
     }
 }
 

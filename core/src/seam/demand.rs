@@ -57,12 +57,17 @@ pub fn left_out(shape: &Shape) -> Vec<String> {
     if !mesh.segments.is_empty() {
         left_out.push(format!("{} line segments are left out: they have no area", mesh.segments.len()));
     }
-    let broken =
-        (0..mesh.triangles.len()).filter(|&t| !mesh.corners(t).iter().all(|c| c.is_finite())).count();
-    if broken > 0 {
-        left_out.push(format!("{broken} triangles with corners that are not finite are left out"));
-    }
+    left_out.extend(broken_triangles(shape));
     left_out
+}
+
+/// Says how many triangles have corners that are nowhere, if any have.
+#[must_use]
+pub fn broken_triangles(shape: &Shape) -> Option<String> {
+    let Shape::Mesh(mesh) = shape else { return None };
+    let is_broken = |t: &usize| !mesh.corners(*t).iter().all(|c| c.is_finite());
+    let broken = (0..mesh.triangles.len()).filter(is_broken).count();
+    (broken > 0).then(|| format!("{broken} triangles with corners that are not finite are left out"))
 }
 
 /// Tells how fine an object is to be converted: no finer than shows.

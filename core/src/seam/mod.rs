@@ -12,7 +12,7 @@ mod report;
 mod survey;
 
 pub use control::{Cancelled, Control, Watcher};
-pub use demand::{Demand, Surfaces, blocks_light, detail, left_out, why_not_drawn};
+pub use demand::{Demand, Surfaces, blocks_light, broken_triangles, detail, left_out, why_not_drawn};
 pub use info::BackendInfo;
 pub use need::{Frame, Need};
 pub use parameter::{Parameter, ParameterError, ParameterKind, Settings, Value};
