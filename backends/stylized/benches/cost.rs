@@ -24,6 +24,9 @@ const STYLES: [(&str, &[(&str, &str)]); 3] = [
     ("... + contours + hatching", &[("tone.steps", "6"), ("hatch", "ink")]),
 ];
 
+/// A renderer, where it draws, and how long that took.
+type Entry = (String, Box<dyn Renderer>, Framebuffer, Vec<Duration>);
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let size = arguments.first().and_then(|a| a.split_once('x')).unwrap_or(("1280", "720"));
@@ -77,7 +80,7 @@ fn measure(
         channels(&[Channel::Distance, Channel::Normal, Channel::Id, Channel::Albedo, Channel::Shadow]);
     let mut registry = Registry::default();
     registry.add(Arc::new(polyptych_raster::Factory), Origin::BuiltIn);
-    let mut renderers: Vec<(String, Box<dyn Renderer>, Framebuffer, Vec<Duration>)> = Vec::new();
+    let mut renderers: Vec<Entry> = Vec::new();
     let mut add = |label: &str, renderer: Box<dyn Renderer>, need: &Need| -> Result<(), Box<dyn Error>> {
         let mut renderer = renderer;
         renderer.prepare(scene, need, &converter, &control)?;

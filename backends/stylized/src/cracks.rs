@@ -76,9 +76,29 @@ impl Scratch {
 }
 
 impl Surfaces<'_> {
-    /// Finds the lines of some rows: those that pass between them and the next.
-    #[inline(always)]
+    /// Finds the lines of some rows: those that pass between them and the next. The widest registers there are find
+    /// the same.
     pub(crate) fn find(&self, rows: std::ops::Range<u32>, scratch: &mut Scratch) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.find_avx2(rows, scratch) };
+        }
+        self.find_here(rows, scratch);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn find_avx2(&self, rows: std::ops::Range<u32>, scratch: &mut Scratch) {
+        self.find_here(rows, scratch);
+    }
+
+    #[inline(always)]
+    fn find_here(&self, rows: std::ops::Range<u32>, scratch: &mut Scratch) {
         let (width, height) = (self.visible.width(), self.visible.height());
         scratch.reserve(width as usize);
         let last = rows.end.min(height.saturating_sub(1));
@@ -304,7 +324,21 @@ impl Surfaces<'_> {
         let index = |p: (u32, u32)| (p.1 * self.visible.width() + p.0) as usize;
         let near = self.visible.distance()[index(a)].min(self.visible.distance()[index(b)]);
         let allowed = f64::from(JUMP * near);
-        !(at_a.abs() <= allowed || at_b.abs() <= allowed)
+        if at_a.abs() <= allowed || at_b.abs() <= allowed {
+            return false;
+        }
+        // A round body that turns away falls back by more than the one plane says and less than the other, or, where
+        // triangles stand for it, by not much more; and it is the farther pixel that sees it under the flatter angle.
+        // Where a body ends it is the nearer one.
+        let cosine = |p: (u32, u32)| {
+            let normal = self.visible.normal()[index(p)].as_dvec3();
+            self.ray(p).map_or(0.0, |ray| normal.dot(ray.direction).abs())
+        };
+        let a_is_nearer = self.visible.distance()[index(a)] < self.visible.distance()[index(b)];
+        let (nearer, farther) = if a_is_nearer { (a, b) } else { (b, a) };
+        let back = f64::from((self.visible.distance()[index(b)] - self.visible.distance()[index(a)]).abs());
+        let is_round = at_a * at_b >= 0.0 || back < 16.0 * self.view.pixel_size(f64::from(near));
+        !(is_round && cosine(farther) < cosine(nearer))
     }
 
     /// Returns where between two pixels their planes cross, if they do.

@@ -11,6 +11,7 @@
 
 use crate::bake::{self, Level};
 use glam::Vec3;
+use polyptych_core::lanes::{F32x8, LANES};
 use polyptych_core::load::Limits;
 use polyptych_core::load::image::decode;
 use polyptych_core::seam::{Parameter, Settings};
@@ -152,60 +153,88 @@ impl Hatching {
         self.levels.iter().map(|l| l.texels.len() as u64 * 4).sum()
     }
 
-    /// Returns how much of a pixel strokes cover, at a place of the pattern (1 is its period), on so much darkness.
+    /// Returns how much of eight pixels strokes cover, at places of the pattern (1 is its period), on so much darkness.
     /// `density` is how many texels of the largest map a pixel is wide.
+    #[expect(clippy::needless_range_loop, reason = "several arrays are read and written lane by lane")]
     #[inline(always)]
-    pub(crate) fn ink(&self, u: f32, v: f32, density: f32, darkness: f32) -> f32 {
-        // The exponent of the density is the map, its mantissa the way to the next one.
-        let bounded = density.clamp(2f32.powi(-20), 2f32.powi(20));
-        let bits = bounded.to_bits();
-        let halvings = (bits >> 23) as i32 - 127;
+    pub(crate) fn ink(&self, u: F32x8, v: F32x8, density: F32x8, darkness: F32x8) -> F32x8 {
         let last = self.levels.len() as i32 - 1;
-        let mantissa = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000);
-        let (index, within, mut on_the_way) = match halvings {
-            h if h > last => (last, bounded / (1 << last) as f32, 1.0),
-            h => (h.max(0), mantissa, mantissa - 1.0),
-        };
-        // Nearer than the largest map the pattern repeats more often: every other of its strokes lies where they lay.
-        let repeats = (1 << -halvings.min(0)) as f32;
-        let (u, v) = (u * repeats, v * repeats);
-        let level = &self.levels[index as usize];
-        let (size, mask) = (level.size as f32, level.size as i32 - 1);
-        let (x, y) = (u * size - 0.5, v * size - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (((x - x0) * 16.0) as u32, ((y - y0) * 16.0) as u32);
-        let (column, row) = (x0 as i32 & mask, y0 as i32 & mask);
-        let (right, below) = ((column + 1) & mask, (row + 1) & mask);
-        let at = |row: i32, column: i32| level.texels[(row << level.shift | column) as usize];
-        let corners = [at(row, column), at(row, right), at(below, column), at(below, right)];
-        let weights = [(16 - fx) * (16 - fy), fx * (16 - fy), (16 - fx) * fy, fx * fy];
-        // Two sums in one word: of the even bytes, each below 2^16.
-        let sums = (0..4).fold(0u32, |sum, i| sum.wrapping_add((corners[i] & 0x00ff_00ff) * weights[i]));
+        let repeats_near = self.set != Set::Images;
+        // The exponent of the density is the map, its mantissa the way to the next one.
+        let bounded = density.max(F32x8::splat(2f32.powi(-20))).min(F32x8::splat(2f32.powi(20)));
+        let (mut index, mut within, mut way, mut beyond) =
+            ([0i32; LANES], F32x8::ZERO, F32x8::ZERO, F32x8::ZERO);
+        let (mut size, mut repeats) = (F32x8::ZERO, F32x8::ZERO);
+        for i in 0..LANES {
+            let bits = bounded.0[i].to_bits();
+            let halvings = (bits >> 23) as i32 - 127;
+            let mantissa = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000);
+            let is_beyond = halvings > last;
+            index[i] = halvings.clamp(0, last);
+            size.0[i] = (EDGE >> index[i]) as f32;
+            let far = f32::from_bits((((halvings - last).max(0) + 127) as u32) << 23);
+            within.0[i] = if is_beyond { mantissa * far } else { mantissa };
+            way.0[i] = if is_beyond { 0.0 } else { mantissa - 1.0 };
+            beyond.0[i] = if is_beyond { 2.0 / (mantissa * far) } else { 1.0 };
+            // Nearer than the largest map the pattern repeats more often: every other of its strokes lies where they
+            // lay. Pictures have no such strokes.
+            let near = if repeats_near { -halvings.min(0) } else { 0 };
+            repeats.0[i] = f32::from_bits(((near + 127) as u32) << 23);
+        }
+        let half = F32x8::splat(0.5);
+        let (x, y) = (u * repeats * size - half, v * repeats * size - half);
+        let (mut sums, mut orders) = ([0u32; LANES], [0u32; LANES]);
+        let mut places = [[0i32; LANES]; 4];
+        for i in 0..LANES {
+            let (x0, y0) = (x.0[i].floor(), y.0[i].floor());
+            places[0][i] = x0 as i32;
+            places[1][i] = y0 as i32;
+            places[2][i] = ((x.0[i] - x0) * 16.0) as i32;
+            places[3][i] = ((y.0[i] - y0) * 16.0) as i32;
+        }
+        for i in 0..LANES {
+            let [x0, y0, fx, fy] = [0, 1, 2, 3].map(|k| places[k][i]);
+            let level = &self.levels[index[i] as usize];
+            let mask = level.size as i32 - 1;
+            let (column, row) = (x0 & mask, (y0 & mask) << level.shift);
+            let (right, below) = ((column + 1) & mask, ((y0 + 1) & mask) << level.shift);
+            let at = |place: i32| level.texels[place as usize & (level.texels.len() - 1)];
+            let corners = [at(row | column), at(row | right), at(below | column), at(below | right)];
+            let [fx, fy] = [fx, fy].map(|f| f as u32);
+            let weights = [(16 - fx) * (16 - fy), fx * (16 - fy), (16 - fx) * fy, fx * fy];
+            // Two sums in one word: of the even bytes, each below 2^16.
+            sums[i] = (0..4).fold(0u32, |sum, k| sum.wrapping_add((corners[k] & 0x00ff_00ff) * weights[k]));
+            orders[i] = corners[(fx > 8) as usize + 2 * (fy > 8) as usize];
+        }
+        let (zero, one, ramp) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(self.ramp));
         if self.set == Set::Images {
-            let threshold = (sums & 0xffff) as f32 * (1.25 / (255.0 * 256.0));
-            return ((darkness - threshold) * self.ramp + 0.5).clamp(0.0, 1.0);
+            let mut threshold = zero;
+            for i in 0..LANES {
+                threshold.0[i] = (sums[i] & 0xffff) as f32 * (1.25 / (255.0 * 256.0));
+            }
+            return ((darkness - threshold) * ramp + half).max(zero).min(one);
         }
-        let nearest = corners[(fx > 8) as usize + 2 * (fy > 8) as usize];
-        let mut thickness = self.half_width;
-        if halvings > last {
-            // No map is small enough: what is left shows as an even tone.
-            thickness *= 2.0 / within.max(2.0);
-            on_the_way = 0.0;
-        }
-        let pixels = 1.0 / (256.0 * STEPS * within);
-        let family = |index: usize, distance: u32, order: u32| {
-            let order = (order & 7) as usize;
-            let begin = self.begins[index][order] + self.changes[index][order] * on_the_way;
-            let grown = ((darkness - begin) * self.ramp).clamp(0.0, 1.0);
+        let thickness = F32x8::splat(self.half_width) * beyond;
+        let pixels = F32x8::splat(1.0 / (256.0 * STEPS)) / within;
+        let mut clear = one;
+        for family in 0..2 {
+            let (mut distance, mut begin, mut change, mut thins) = (zero, zero, zero, one);
+            for i in 0..LANES {
+                let order = (orders[i] >> (8 + 16 * family) & 7) as usize;
+                distance.0[i] = (sums[i] >> (16 * family) & 0xffff) as f32;
+                begin.0[i] = self.begins[family][order];
+                change.0[i] = self.changes[family][order];
+                thins.0[i] = if order == 0 { 1.0 - way.0[i] } else { 1.0 };
+            }
+            let grown = ((darkness - begin - change * way) * ramp).max(zero).min(one);
             let grown = if self.set == Set::Dots { grown.sqrt() } else { grown };
-            let thins = if order == 0 { 1.0 - on_the_way } else { 1.0 };
-            let half = thickness * grown * thins;
+            let reach = thickness * grown * thins;
             // A stroke thinner than a pixel covers as much of it as it is wide.
-            (half + 0.5 - distance as f32 * pixels).clamp(0.0, (2.0 * half).min(1.0))
-        };
-        let first = family(0, sums & 0xffff, nearest >> 8);
-        let second = family(1, sums >> 16, nearest >> 24);
-        first + second - first * second
+            let most = (reach + reach).min(one);
+            let covered = (reach + half - distance * pixels).max(zero).min(most);
+            clear = clear * (one - covered);
+        }
+        one - clear
     }
 }
 

@@ -273,7 +273,7 @@ fn trace(lens: &Lens, sight: &Sight<'_>, line: Line, a: DVec3, b: DVec3, strokes
             let share = part * far_b / ((1.0 - part) * far_a + part * far_b);
             a.lerp(b, share)
         };
-        let is_seen = sight.sees(at(part), place, lens.is_parallel);
+        let is_seen = sight.sees(at(part), place, lens.is_parallel, line.kind == Kind::Silhouette);
         if state != Some(is_seen) {
             if let Some(was) = state {
                 put(begin, i, was);
@@ -288,18 +288,30 @@ fn trace(lens: &Lens, sight: &Sight<'_>, line: Line, a: DVec3, b: DVec3, strokes
 
 impl Sight<'_> {
     /// Tells whether nothing hides a place of an edge: `pixel` is where it is on the picture, `place` where in camera
-    /// space.
-    fn sees(&self, pixel: [f64; 2], place: DVec3, is_parallel: bool) -> bool {
+    /// space; `ends` for one at which the body ends.
+    fn sees(&self, pixel: [f64; 2], place: DVec3, is_parallel: bool, ends: bool) -> bool {
         let (width, height) = (i64::from(self.visible.width()), i64::from(self.visible.height()));
         let distance = if is_parallel { -place.z } else { place.length() };
         let size = self.view.pixel_size(distance);
-        let allowed = 1.5 * size + 1e-5 * distance;
+        // Beyond the picture's edge nothing is known: what is there is judged by the nearest pixels, and generously.
+        let is_outside = pixel[0] < 0.5
+            || pixel[1] < 0.5
+            || pixel[0] > width as f64 - 0.5
+            || pixel[1] > height as f64 - 0.5;
+        let allowed = if is_outside { 24.0 } else { 1.5 } * size + 1e-5 * distance;
         let (x, y) = ((pixel[0] - 0.5).floor() as i64, (pixel[1] - 0.5).floor() as i64);
         let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
         let there = around.map(|(x, y)| (x.clamp(0, width - 1), y.clamp(0, height - 1)));
         let index = |(x, y): (i64, i64)| (y * width + x) as usize;
         let seen = self.visible.distance();
         if there.iter().any(|&p| f64::from(seen[index(p)]) >= distance - allowed) {
+            return true;
+        }
+        // A line at which a body ends may lie a little within its outline on the picture, as faces are flat: it is seen
+        // where a pixel next to those shows what is behind.
+        let (x, y) = (pixel[0].floor() as i64, pixel[1].floor() as i64);
+        let beyond = |k: i64| ((x + k % 3 - 1).clamp(0, width - 1), (y + k / 3 - 1).clamp(0, height - 1));
+        if ends && (0..9).any(|k| f64::from(seen[index(beyond(k))]) >= distance - allowed) {
             return true;
         }
         // The surface of a pixel may run away from the eye: where is its plane at the place of the edge?
@@ -310,6 +322,10 @@ impl Sight<'_> {
         };
         there.iter().any(|&p| {
             let i = index(p);
+            // A plane says little far from its pixel: what is much farther than it is hidden.
+            if f64::from(seen[i]) + 24.0 * size < distance - allowed {
+                return false;
+            }
             let Some(ray) = self.view.ray(p.0 as f64 + 0.5, p.1 as f64 + 0.5) else { return false };
             let normal = self.visible.normal()[i].as_dvec3();
             let found = f64::from(seen[i]);
@@ -323,7 +339,6 @@ impl Sight<'_> {
                 ray.origin
             };
             let predicted = normal.dot(ray.at(found) - origin) / slope;
-            // A plane says little far from its pixel.
             predicted.min(found + 24.0 * size) >= distance - allowed
         })
     }

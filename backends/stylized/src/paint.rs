@@ -9,7 +9,7 @@ use crate::style::{Highlight, Paper, Show, Style, Styles};
 use glam::{DVec3, Mat3, Vec3};
 use polyptych_core::camera::{Camera, Projection, RowDirections, View};
 use polyptych_core::framebuffer::{Band, Framebuffer};
-use polyptych_core::lanes::{F32x8, F64x8, I32x8, LANES, Vec3x8};
+use polyptych_core::lanes::{F32x8, F64x8, I32x8, LANES, Mask8, Vec3x8};
 use polyptych_core::scene::{Object, Scene};
 use polyptych_core::shade::{fogged, highlight};
 
@@ -21,6 +21,8 @@ pub(crate) const ROWS: u32 = 16;
 pub(crate) struct Look {
     pub(crate) specular: f32,
     pub(crate) shininess: f32,
+    /// Cosine below which its highlight is less than a five-hundredth: not seen.
+    pub(crate) faint: f32,
     /// Whether its color channel holds texture coordinates and the slot of its material.
     pub(crate) is_coded: bool,
     /// Edge of the strokes' pattern in object space, before scaling.
@@ -262,23 +264,19 @@ impl Painting<'_> {
             let (direction, origin) = self.rays(x, y, directions.as_ref());
             let eight = Eight { x: x as u32, y, count, first: row + x, direction };
             let around = [own + LANES + x, stride];
-            let style = self.styles.index(own_ids[0]);
-            let is_one = own_ids.iter().all(|&id| self.styles.index(id) == style);
             let out = &mut colors[x..x + count];
-            let mut paint = |style: u8| {
-                let result = self.eight(&self.styles.all[usize::from(style)], &eight, origin, around, facing);
-                for (lane, color) in out.iter_mut().enumerate() {
-                    if own_ids[lane] != 0 && self.styles.index(own_ids[lane]) == style {
+            // Mostly one style; each that is there paints its own pixels.
+            for (index, style) in (0u8..).zip(&self.styles.all) {
+                let is_own = |id: &u32| *id != 0 && self.styles.index(*id) == index;
+                if !own_ids.iter().any(is_own) {
+                    continue;
+                }
+                let result = self.eight(style, &eight, origin, around, facing);
+                for (lane, (color, id)) in out.iter_mut().zip(own_ids).enumerate() {
+                    if is_own(id) {
                         *color = result.get(lane);
                     }
                 }
-            };
-            if is_one {
-                paint(style);
-            } else {
-                (0..self.styles.all.len() as u8)
-                    .filter(|&s| own_ids.iter().any(|&id| id != 0 && self.styles.index(id) == s))
-                    .for_each(&mut paint);
             }
         }
     }
@@ -421,10 +419,11 @@ impl Painting<'_> {
             return color;
         }
         let ids = &self.visible.id()[first..first + count];
-        let (mut strength, mut shininess) = (zero, [1.0f32; LANES]);
+        let (mut strength, mut shininess, mut faint) = (zero, [1.0f32; LANES], zero);
         for (lane, &id) in ids.iter().enumerate() {
             let look = &self.looks[(id.wrapping_sub(1) as usize).min(self.looks.len() - 1)];
             (strength.0[lane], shininess[lane]) = (look.specular, look.shininess);
+            faint.0[lane] = look.faint;
         }
         if !strength.above(zero).any() {
             return color;
@@ -434,7 +433,7 @@ impl Painting<'_> {
         let normal = gather(self.visible.normal(), first, count);
         let between = toward - direction;
         let half = between.dot(normal) / between.length().max(F32x8::splat(f32::MIN_POSITIVE));
-        let faces = cosine.above(zero) & half.above(zero);
+        let faces = cosine.above(zero) & half.above(faint);
         if !faces.any() {
             return color;
         }
@@ -489,12 +488,10 @@ impl Painting<'_> {
         }
         let mut ink = F32x8::ZERO;
         if hatching.sticks == Sticks::Screen {
-            let scale = 1.0 / (EDGE as f32 * hatching.scale);
-            let v = y as f32 * scale;
-            for lane in 0..count {
-                let u = (x + lane as u32) as f32 * scale;
-                ink.0[lane] = hatching.ink(u, v, 1.0 / hatching.scale, darkness.0[lane]);
-            }
+            let scale = F32x8::splat(1.0 / (EDGE as f32 * hatching.scale));
+            let u = I32x8::count_from(x as i32).to_f64().round() * scale;
+            let v = F32x8::splat(y as f32) * scale;
+            ink = hatching.ink(u, v, F32x8::splat(1.0 / hatching.scale), darkness);
         } else {
             let distance = numbers(self.visible.distance(), first, count);
             let place = origin + direction.scaled(distance);
@@ -547,39 +544,58 @@ impl Run<'_> {
     fn ink(self, hatching: &Hatching, darkness: F32x8, ink: &mut F32x8) {
         let Self { look, lanes, place, normal, pixels, coordinates } = self;
         let texels = pixels * F32x8::splat(look.repeats * EDGE as f32);
+        let mut covered = F32x8::ZERO;
         if let Some(coordinates) = coordinates {
             // A texture is taken to be laid once around the body: six periods.
-            let scale = 6.0 / hatching.scale;
-            for lane in lanes.filter(|&lane| darkness.0[lane] > hatching.lightest) {
-                let (u, v) = (coordinates.x.0[lane] * scale, coordinates.y.0[lane] * scale);
-                ink.0[lane] = hatching.ink(u, v, texels.0[lane], darkness.0[lane]);
+            let scale = F32x8::splat(6.0 / hatching.scale);
+            let (u, v) = (coordinates.x * scale, coordinates.y * scale);
+            // By how much they change to the neighbor: how wide a pixel is in the pattern.
+            let mut density = texels;
+            for lane in lanes.clone().filter(|_| lanes.len() > 1) {
+                let beside = if lane + 1 < lanes.end { lane + 1 } else { lane - 1 };
+                let change = (u.0[beside] - u.0[lane]).hypot(v.0[beside] - v.0[lane]);
+                if change > 0.0 && change < 0.25 {
+                    density.0[lane] = change * EDGE as f32;
+                }
             }
-            return;
-        }
-        let p = turned(&look.pattern, place) + Vec3x8::splat(look.eye);
-        let n = turned(&look.turn, normal);
-        let (nx, ny, nz) = (n.x.abs(), n.y.abs(), n.z.abs());
-        for lane in lanes.filter(|&lane| darkness.0[lane] > hatching.lightest) {
-            let (px, py, pz) = (p.x.0[lane], p.y.0[lane], p.z.0[lane]);
-            let planes = [[pz, -py], [px, pz], [px, -py]];
-            let weights = [nx.0[lane], ny.0[lane], nz.0[lane]];
+            covered = hatching.ink(u, v, density, darkness);
+        } else {
+            let p = turned(&look.pattern, place) + Vec3x8::splat(look.eye);
+            let n = turned(&look.turn, normal);
+            let weights = [n.x.abs(), n.y.abs(), n.z.abs()];
             // Along the axis that the surface faces most, and mixed with the next where they are much alike.
-            let first = if weights[0] >= weights[1] && weights[0] >= weights[2] {
-                0
-            } else {
-                1 + usize::from(weights[2] > weights[1])
-            };
-            let [a, b] = [(first + 1) % 3, (first + 2) % 3];
-            let second = if weights[a] >= weights[b] { a } else { b };
-            let mix = ((weights[second] - 0.85 * weights[first]) / (0.3 * weights[first])).clamp(0.0, 0.5);
-            let at = |axis: usize| {
-                hatching.ink(planes[axis][0], planes[axis][1], texels.0[lane], darkness.0[lane])
-            };
-            let mut covered = at(first);
-            if mix > 0.0 {
-                covered += (at(second) - covered) * mix;
+            let (zero, most) = (F32x8::ZERO, weights[0].max(weights[1]).max(weights[2]));
+            let least = weights[0].min(weights[1]).min(weights[2]);
+            let next = weights[0] + weights[1] + weights[2] - most - least;
+            let mix = ((next - most * F32x8::splat(0.85))
+                / (most * F32x8::splat(0.3)).max(F32x8::splat(1e-20)))
+            .max(zero)
+            .min(F32x8::splat(0.5));
+            let is_first = [weights[0].at_least(most), weights[1].at_least(most), weights[2].at_least(most)];
+            let is_last =
+                [least.at_least(weights[0]), least.at_least(weights[1]), least.at_least(weights[2])];
+            let mut first = [Mask8::NONE; 3];
+            let mut second = [Mask8::NONE; 3];
+            first[0] = is_first[0];
+            first[1] = is_first[1] & !first[0];
+            first[2] = !(first[0] | first[1]);
+            for axis in 0..3 {
+                second[axis] = !first[axis] & !is_last[axis];
             }
-            ink.0[lane] = covered;
+            let planes = [(p.z, -p.y), (p.x, p.z), (p.x, -p.y)];
+            let mixes = mix.above(zero).any();
+            for (chosen, share, needed) in [(first, F32x8::splat(1.0) - mix, true), (second, mix, mixes)] {
+                if !needed {
+                    continue;
+                }
+                let pick = |a: F32x8, b: F32x8, c: F32x8| chosen[0].pick(a, chosen[1].pick(b, c));
+                let u = pick(planes[0].0, planes[1].0, planes[2].0);
+                let v = pick(planes[0].1, planes[1].1, planes[2].1);
+                covered = covered + hatching.ink(u, v, texels, darkness) * share;
+            }
+        }
+        for lane in lanes {
+            ink.0[lane] = covered.0[lane];
         }
     }
 }

@@ -151,6 +151,7 @@ pub(crate) fn looks(scene: &Scene, coded: &[bool]) -> Vec<Look> {
         Look {
             specular: material.specular,
             shininess: material.shininess,
+            faint: 0.002f32.powf(1.0 / material.shininess.max(1e-3)),
             is_coded: coded.get(index).copied().unwrap_or(false),
             period: if radius > 0.0 && radius.is_finite() { radius * 2.0 } else { 1.0 },
             ..Look::default()

@@ -12,6 +12,7 @@ use crate::prepare::{Coded, Outlines, colorful, looks};
 use crate::preset::Preset;
 use crate::stroke::Stroke;
 use crate::style::Styles;
+use glam::DVec3;
 use polyptych_core::camera::Camera;
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
@@ -54,6 +55,8 @@ struct Ready {
     styles: Styles,
     lights: Vec<Light>,
     colorful: Vec<bool>,
+    /// Around the scene.
+    ball: (DVec3, f64),
 }
 
 /// Buffers that live from frame to frame.
@@ -233,7 +236,10 @@ impl Renderer for Stylized {
         self.outlines.prepare(scene, &prepared.objects, &styles, need, converter, control)?;
         self.scratch.looks = looks(scene, &self.coded.objects);
         let colorful = colorful(scene, &styles);
-        self.ready = Some(Ready { scene: scene.clone(), styles, lights: scene.lights.clone(), colorful });
+        let bounds = scene.bounds();
+        let ball = (bounds.center(), bounds.radius());
+        self.ready =
+            Some(Ready { scene: scene.clone(), styles, lights: scene.lights.clone(), colorful, ball });
         prepared.bytes += self.bytes();
         Ok(prepared)
     }
@@ -374,9 +380,9 @@ impl Buffers {
                 look.place(&scene.objects[index], camera, hatching.scale);
             }
         }
-        let bounds = scene.bounds();
-        let middle = bounds.center().distance(camera.eye);
-        let depths = [(middle - bounds.radius()).max(0.0) as f32, (middle + bounds.radius()) as f32];
+        let (center, radius) = ready.ball;
+        let middle = center.distance(camera.eye);
+        let depths = [(middle - radius).max(0.0) as f32, (middle + radius) as f32];
         let painting = Painting {
             scene,
             styles: &ready.styles,
