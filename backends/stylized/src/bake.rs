@@ -9,9 +9,33 @@ pub(crate) struct Level {
     pub(crate) size: u32,
     /// Its logarithm.
     pub(crate) shift: u32,
-    /// Bytes from the lowest: distance and order of the nearest stroke of the first family, and of the second. For
-    /// pictures the lowest is the threshold, and nothing else.
+    /// Bytes from the lowest: distance and order of the nearest stroke of the first family, and of the second; those of
+    /// strokes are signed, around [`MIDDLE`]. For pictures the lowest is the threshold, and nothing else.
     pub(crate) texels: Vec<u32>,
+}
+
+/// What a signed distance of zero is stored as, and the steps of one in a texel.
+pub(crate) const MIDDLE: f32 = 128.0;
+pub(crate) const SIGNED_STEPS: f32 = 16.0;
+
+/// Directions across the strokes of a set's families, of unit length; dots have none.
+pub(crate) fn across(set: Set) -> Option<[[f32; 2]; 2]> {
+    let unit = |f: Family| {
+        let [a, b] = f.along.map(|c| c as f32);
+        [a / a.hypot(b), b / a.hypot(b)]
+    };
+    matches!(set, Set::Pencil | Set::Ink).then(|| families(set).map(unit))
+}
+
+fn families(set: Set) -> [Family; 2] {
+    let ink = |along, seed| Family { along, count: 32, wobble: 0.12, gap: 0.05, seed };
+    match set {
+        Set::Pencil => [
+            Family { along: [1, 1], count: 32, wobble: 0.34, gap: 0.16, seed: 1 },
+            Family { along: [1, 2], count: 16, wobble: 0.3, gap: 0.2, seed: 2 },
+        ],
+        _ => [ink([1, 1], 3), ink([1, -1], 4)],
+    }
 }
 
 /// A picture in gray.
@@ -35,14 +59,7 @@ struct Family {
 
 /// Bakes one of our own sets.
 pub(crate) fn strokes(set: Set) -> Vec<Level> {
-    let ink = |along, seed| Family { along, count: 32, wobble: 0.12, gap: 0.05, seed };
-    let families = match set {
-        Set::Pencil => [
-            Family { along: [1, 1], count: 32, wobble: 0.34, gap: 0.16, seed: 1 },
-            Family { along: [1, 2], count: 16, wobble: 0.3, gap: 0.2, seed: 2 },
-        ],
-        _ => [ink([1, 1], 3), ink([1, -1], 4)],
-    };
+    let families = families(set);
     sizes()
         .enumerate()
         .map(|(halvings, size)| {
@@ -98,6 +115,24 @@ fn packed(texels: f32, order: u32) -> u32 {
     (texels * STEPS).clamp(0.0, 255.0).round() as u32 | order.min(7) << 8
 }
 
+impl Level {
+    /// Returns the sums of the even bytes around a place, each times 256, and the nearest texel.
+    #[inline(always)]
+    pub(crate) fn between(&self, x: f32, y: f32) -> (u32, u32) {
+        let (x0, y0) = (x.floor(), y.floor());
+        let (fx, fy) = (((x - x0) * 16.0) as u32, ((y - y0) * 16.0) as u32);
+        let mask = self.size as i32 - 1;
+        let (column, row) = (x0 as i32 & mask, (y0 as i32 & mask) << self.shift);
+        let (right, below) = ((column + 1) & mask, ((y0 as i32 + 1) & mask) << self.shift);
+        let at = |place: i32| self.texels[place as usize];
+        let corners = [at(row | column), at(row | right), at(below | column), at(below | right)];
+        let weights = [(16 - fx) * (16 - fy), fx * (16 - fy), (16 - fx) * fy, fx * fy];
+        // Two sums in one word, each below 2^16.
+        let sum = (0..4).fold(0u32, |sum, k| sum.wrapping_add((corners[k] & 0x00ff_00ff) * weights[k]));
+        (sum, corners[usize::from(fx > 8) + 2 * usize::from(fy > 8)])
+    }
+}
+
 impl Family {
     /// Returns distance and order of the nearest of the strokes that are left after so many halvings.
     fn nearest(&self, u: f32, v: f32, halvings: u32, size: u32) -> u32 {
@@ -113,16 +148,17 @@ impl Family {
         for candidate in near - 1..=near + 1 {
             let number = candidate.rem_euclid(left as i32) as u32 * step;
             let swing = self.wobble / self.count as f32 * wave(along, number, self.seed);
-            let aside = (across - candidate as f32 / left as f32 - swing).abs() / length;
+            let aside = (across - candidate as f32 / left as f32 - swing) / length;
             let lifted = self.lifted(along, number);
-            let distance = aside.hypot(lifted) * size as f32;
-            if distance < best.0 {
+            let distance = aside.hypot(lifted).copysign(aside) * size as f32;
+            if distance.abs() < best.0.abs() {
                 best = (distance, number);
             }
         }
         // The order counts among what is left; that of stroke 0 has no end.
         let among = best.1 / step;
-        packed(best.0, if among == 0 { 7 } else { among.trailing_zeros() })
+        let order = if among == 0 { 7 } else { among.trailing_zeros() };
+        (best.0 * SIGNED_STEPS + MIDDLE).clamp(0.0, 255.0).round() as u32 | order.min(7) << 8
     }
 
     /// Returns how far a place is from the end of the stroke, where the pen is lifted; 0 on the stroke.
@@ -185,6 +221,12 @@ impl Picture {
 mod tests {
     use super::*;
 
+    /// Reads the distance of a texel.
+    fn stored(set: Set, texel: u32) -> f32 {
+        let byte = (texel & 255) as f32;
+        if set == Set::Dots { byte / STEPS } else { ((byte - MIDDLE) / SIGNED_STEPS).abs() }
+    }
+
     #[test]
     fn maps_repeat_without_a_seam_and_halve_the_strokes() {
         for set in [Set::Pencil, Set::Ink, Set::Dots] {
@@ -194,13 +236,12 @@ mod tests {
                 // Distances change by no more than the way to the next texel, over the seam as elsewhere. Between
                 // lifted ends of strokes another may be the nearest, which is as far at that place.
                 let size = level.size;
-                let distance = |x: u32, y: u32| {
-                    (level.texels[(y % size * size + x % size) as usize] & 255) as f32 / STEPS
-                };
+                let distance =
+                    |x: u32, y: u32| stored(set, level.texels[(y % size * size + x % size) as usize]);
                 let jumps =
                     (0..size).filter(|&y| (distance(size - 1, y) - distance(size, y)).abs() > 1.3).count();
                 assert!(jumps * 20 <= size as usize, "{set:?} {size}: {jumps} jumps");
-                let near = level.texels.iter().filter(|t| (*t & 255) < STEPS as u32).count() as f32;
+                let near = level.texels.iter().filter(|t| stored(set, **t) < 1.0).count() as f32;
                 let share = near / level.texels.len() as f32;
                 assert!((0.05..0.5).contains(&share), "{set:?} {size}: {share} is near strokes");
             }

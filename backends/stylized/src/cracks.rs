@@ -30,6 +30,9 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) visible: &'a Framebuffer,
     pub(crate) view: View<'a>,
     pub(crate) styles: &'a Styles,
+    /// How large a pixel is at distance 1, or for parallel rays at any.
+    pub(crate) pixel: f64,
+    pub(crate) is_parallel: bool,
     /// Which objects have their lines from their edges.
     pub(crate) outlined: &'a [bool],
     /// Which objects are of several plain materials.
@@ -268,8 +271,12 @@ impl Surfaces<'_> {
             })
         };
         if ids[0] != ids[1] {
-            if ids[0] != 0
+            // Bodies that cross are next to each other there; to look closer takes time.
+            let (near, far) = (near_i.min(near_j), near_i.max(near_j));
+            if f64::from(far - near) < 64.0 * self.pixel_at(near)
+                && ids[0] != 0
                 && ids[1] != 0
+                && self.style(object).pen(Kind::Intersection).is_drawn
                 && let Some(part) = self.crossing(a, b)
             {
                 return found(Kind::Intersection, part);
@@ -295,6 +302,11 @@ impl Surfaces<'_> {
         let colors = self.has_colors(object)
             && (plane.albedo()[i] - plane.albedo()[j]).abs().max_element() > OTHER_COLOR;
         if colors { found(Kind::Material, 0.5) } else { None }
+    }
+
+    /// Returns how large a pixel is at a distance.
+    fn pixel_at(&self, distance: f32) -> f64 {
+        if self.is_parallel { self.pixel } else { self.pixel * f64::from(distance) }
     }
 
     fn ray(&self, p: (u32, u32)) -> Option<Ray> {
@@ -337,7 +349,7 @@ impl Surfaces<'_> {
         let a_is_nearer = self.visible.distance()[index(a)] < self.visible.distance()[index(b)];
         let (nearer, farther) = if a_is_nearer { (a, b) } else { (b, a) };
         let back = f64::from((self.visible.distance()[index(b)] - self.visible.distance()[index(a)]).abs());
-        let is_round = at_a * at_b >= 0.0 || back < 16.0 * self.view.pixel_size(f64::from(near));
+        let is_round = at_a * at_b >= 0.0 || back < 16.0 * self.pixel_at(near);
         !(is_round && cosine(farther) < cosine(nearer))
     }
 
@@ -345,7 +357,7 @@ impl Surfaces<'_> {
     fn crossing(&self, a: (u32, u32), b: (u32, u32)) -> Option<f32> {
         let [at_a, at_b] = self.gaps(a, b)?;
         let index = (a.1 * self.visible.width() + a.0) as usize;
-        let most = 16.0 * self.view.pixel_size(f64::from(self.visible.distance()[index]));
+        let most = 16.0 * self.pixel_at(self.visible.distance()[index]);
         let crosses = at_a * at_b >= 0.0 && at_a.abs() <= most && at_b.abs() <= most;
         let sum = at_a + at_b;
         // In front of both planes is the ridge of two bodies that cross; behind both a fold of one.

@@ -9,7 +9,7 @@
 //! Source: E. Praun, H. Hoppe, M. Webb, A. Finkelstein, *Real-time hatching*, SIGGRAPH 2001, with distances in place
 //! of painted levels.
 
-use crate::bake::{self, Level};
+use crate::bake::{self, Level, MIDDLE, SIGNED_STEPS};
 use glam::Vec3;
 use polyptych_core::lanes::{F32x8, LANES};
 use polyptych_core::load::Limits;
@@ -65,6 +65,8 @@ struct Source {
 pub(crate) struct Hatching {
     source: Source,
     levels: Arc<[Level]>,
+    /// Across the strokes of both families, where there are strokes.
+    across: Option<[[f32; 2]; 2]>,
     pub(crate) set: Set,
     pub(crate) sticks: Sticks,
     pub(crate) scale: f32,
@@ -133,6 +135,7 @@ impl Hatching {
         Ok(Some(Arc::new(Self {
             source,
             levels,
+            across: bake::across(set),
             set,
             sticks,
             scale: float("hatch.scale"),
@@ -182,46 +185,52 @@ impl Hatching {
             repeats.0[i] = f32::from_bits(((near + 127) as u32) << 23);
         }
         let half = F32x8::splat(0.5);
-        let (x, y) = (u * repeats * size - half, v * repeats * size - half);
-        let (mut sums, mut orders) = ([0u32; LANES], [0u32; LANES]);
-        let mut places = [[0i32; LANES]; 4];
-        for i in 0..LANES {
-            let (x0, y0) = (x.0[i].floor(), y.0[i].floor());
-            places[0][i] = x0 as i32;
-            places[1][i] = y0 as i32;
-            places[2][i] = ((x.0[i] - x0) * 16.0) as i32;
-            places[3][i] = ((y.0[i] - y0) * 16.0) as i32;
-        }
-        for i in 0..LANES {
-            let [x0, y0, fx, fy] = [0, 1, 2, 3].map(|k| places[k][i]);
-            let level = &self.levels[index[i] as usize];
-            let mask = level.size as i32 - 1;
-            let (column, row) = (x0 & mask, (y0 & mask) << level.shift);
-            let (right, below) = ((column + 1) & mask, ((y0 + 1) & mask) << level.shift);
-            let at = |place: i32| level.texels[place as usize & (level.texels.len() - 1)];
-            let corners = [at(row | column), at(row | right), at(below | column), at(below | right)];
-            let [fx, fy] = [fx, fy].map(|f| f as u32);
-            let weights = [(16 - fx) * (16 - fy), fx * (16 - fy), (16 - fx) * fy, fx * fy];
-            // Two sums in one word: of the even bytes, each below 2^16.
-            sums[i] = (0..4).fold(0u32, |sum, k| sum.wrapping_add((corners[k] & 0x00ff_00ff) * weights[k]));
-            orders[i] = corners[(fx > 8) as usize + 2 * (fy > 8) as usize];
+        let (x, y) = (u * repeats * size, v * repeats * size);
+        let mut orders = [0u32; LANES];
+        let mut distances = [F32x8::ZERO; 2];
+        if let Some(across) = self.across {
+            // Strokes are straight over a texel: what lies between its middle and the place is added.
+            let (mut right, mut down) = (F32x8::ZERO, F32x8::ZERO);
+            for i in 0..LANES {
+                let (x0, y0) = (x.0[i].floor(), y.0[i].floor());
+                (right.0[i], down.0[i]) = (x.0[i] - x0 - 0.5, y.0[i] - y0 - 0.5);
+                let level = &self.levels[index[i] as usize];
+                let mask = level.size as i32 - 1;
+                orders[i] = level.texels[((y0 as i32 & mask) << level.shift | (x0 as i32 & mask)) as usize];
+            }
+            for (family, distance) in distances.iter_mut().enumerate() {
+                let mut stored = F32x8::ZERO;
+                for i in 0..LANES {
+                    stored.0[i] = (orders[i] >> (16 * family) & 255) as f32;
+                }
+                let [a, b] = across[family].map(F32x8::splat);
+                let middle = (stored - F32x8::splat(MIDDLE)) * F32x8::splat(1.0 / SIGNED_STEPS);
+                *distance = (middle + right * a + down * b).abs();
+            }
+        } else {
+            let mut sums = [0u32; LANES];
+            for i in 0..LANES {
+                let level = &self.levels[index[i] as usize];
+                (sums[i], orders[i]) = level.between(x.0[i] - 0.5, y.0[i] - 0.5);
+            }
+            for (family, distance) in distances.iter_mut().enumerate() {
+                for i in 0..LANES {
+                    distance.0[i] = (sums[i] >> (16 * family) & 0xffff) as f32 * (1.0 / (256.0 * STEPS));
+                }
+            }
         }
         let (zero, one, ramp) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(self.ramp));
         if self.set == Set::Images {
-            let mut threshold = zero;
-            for i in 0..LANES {
-                threshold.0[i] = (sums[i] & 0xffff) as f32 * (1.25 / (255.0 * 256.0));
-            }
+            let threshold = distances[0] * F32x8::splat(1.25 * STEPS / 255.0);
             return ((darkness - threshold) * ramp + half).max(zero).min(one);
         }
         let thickness = F32x8::splat(self.half_width) * beyond;
-        let pixels = F32x8::splat(1.0 / (256.0 * STEPS)) / within;
+        let pixels = F32x8::splat(1.0) / within;
         let mut clear = one;
         for family in 0..2 {
-            let (mut distance, mut begin, mut change, mut thins) = (zero, zero, zero, one);
+            let (mut begin, mut change, mut thins) = (zero, zero, one);
             for i in 0..LANES {
                 let order = (orders[i] >> (8 + 16 * family) & 7) as usize;
-                distance.0[i] = (sums[i] >> (16 * family) & 0xffff) as f32;
                 begin.0[i] = self.begins[family][order];
                 change.0[i] = self.changes[family][order];
                 thins.0[i] = if order == 0 { 1.0 - way.0[i] } else { 1.0 };
@@ -231,7 +240,7 @@ impl Hatching {
             let reach = thickness * grown * thins;
             // A stroke thinner than a pixel covers as much of it as it is wide.
             let most = (reach + reach).min(one);
-            let covered = (reach + half - distance * pixels).max(zero).min(most);
+            let covered = (reach + half - distances[family] * pixels).max(zero).min(most);
             clear = clear * (one - covered);
         }
         one - clear

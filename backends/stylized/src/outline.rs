@@ -64,6 +64,8 @@ pub(crate) struct Sight<'a> {
     pub(crate) view: View<'a>,
     pub(crate) visible: &'a Framebuffer,
     pub(crate) styles: &'a Styles,
+    /// How large a pixel is at distance 1, or for parallel rays at any.
+    pub(crate) pixel: f64,
 }
 
 /// Tells whether a projection keeps straight lines straight, so that edges are drawn by their ends.
@@ -254,8 +256,6 @@ fn trace(lens: &Lens, sight: &Sight<'_>, line: Line, a: DVec3, b: DVec3, strokes
     }
     let count = length.ceil().max(1.0) as usize;
     let at = |part: f64| [from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part];
-    let mut begin = 0;
-    let mut state = None;
     let mut put = |first: usize, last: usize, is_seen: bool| {
         if is_seen || line.dashes {
             let [from, to] = [first, last].map(|i| at(i as f64 / count as f64).map(|c| c as f32));
@@ -263,83 +263,111 @@ fn trace(lens: &Lens, sight: &Sight<'_>, line: Line, a: DVec3, b: DVec3, strokes
             strokes.push(Stroke { from, to, kind, style, is_hidden: !is_seen, object });
         }
     };
-    for i in 0..count {
+    // Equal steps on the picture are equal steps on a plane before the eye, and of one over the depth.
+    let flat = |p: DVec3| if lens.is_parallel { p } else { DVec3::new(p.x / -p.z, p.y / -p.z, 1.0 / -p.z) };
+    let (flat_a, flat_b) = (flat(a), flat(b));
+    let ends = line.kind == Kind::Silhouette;
+    let (mut begin, mut state, mut i) = (0, None, 0);
+    while i < count {
         let part = (i as f64 + 0.5) / count as f64;
-        let place = if lens.is_parallel {
-            a.lerp(b, part)
-        } else {
-            // Equal steps on the picture are equal steps of one over the depth.
-            let (far_a, far_b) = (1.0 / a.z, 1.0 / b.z);
-            let share = part * far_b / ((1.0 - part) * far_a + part * far_b);
-            a.lerp(b, share)
-        };
-        let is_seen = sight.sees(at(part), place, lens.is_parallel, line.kind == Kind::Silhouette);
+        let p = flat_a + (flat_b - flat_a) * part;
+        let place = if lens.is_parallel { p } else { DVec3::new(p.x, p.y, -1.0) / p.z };
+        let seen = sight.sees(at(part), place, lens.is_parallel, ends);
+        let is_seen = seen == Seen::Yes;
         if state != Some(is_seen) {
             if let Some(was) = state {
                 put(begin, i, was);
             }
             (begin, state) = (i, Some(is_seen));
         }
+        // Behind a wall, the next place is, too.
+        i += if seen == Seen::FarBehind { 2 } else { 1 };
     }
     if let Some(was) = state {
         put(begin, count, was);
     }
 }
 
+/// Whether a place of an edge is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Seen {
+    Yes,
+    No,
+    /// Far behind everything around it.
+    FarBehind,
+}
+
 impl Sight<'_> {
     /// Tells whether nothing hides a place of an edge: `pixel` is where it is on the picture, `place` where in camera
     /// space; `ends` for one at which the body ends.
-    fn sees(&self, pixel: [f64; 2], place: DVec3, is_parallel: bool, ends: bool) -> bool {
-        let (width, height) = (i64::from(self.visible.width()), i64::from(self.visible.height()));
+    #[inline(always)]
+    fn sees(&self, pixel: [f64; 2], place: DVec3, is_parallel: bool, ends: bool) -> Seen {
+        let (width, height) = (self.visible.width() as i32, self.visible.height() as i32);
         let distance = if is_parallel { -place.z } else { place.length() };
-        let size = self.view.pixel_size(distance);
+        let size = if is_parallel { self.pixel } else { self.pixel * distance };
         // Beyond the picture's edge nothing is known: what is there is judged by the nearest pixels, and generously.
         let is_outside = pixel[0] < 0.5
             || pixel[1] < 0.5
-            || pixel[0] > width as f64 - 0.5
-            || pixel[1] > height as f64 - 0.5;
+            || pixel[0] > f64::from(width) - 0.5
+            || pixel[1] > f64::from(height) - 0.5;
         let allowed = if is_outside { 24.0 } else { 1.5 } * size + 1e-5 * distance;
-        let (x, y) = ((pixel[0] - 0.5).floor() as i64, (pixel[1] - 0.5).floor() as i64);
-        let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
-        let there = around.map(|(x, y)| (x.clamp(0, width - 1), y.clamp(0, height - 1)));
-        let index = |(x, y): (i64, i64)| (y * width + x) as usize;
+        let (x, y) = ((pixel[0] - 0.5).floor() as i32, (pixel[1] - 0.5).floor() as i32);
+        let [left, right] = [x, x.saturating_add(1)].map(|x| x.clamp(0, width - 1));
+        let [top, bottom] = [y, y.saturating_add(1)].map(|y| y.clamp(0, height - 1));
+        let index = |x: i32, y: i32| y as usize * width as usize + x as usize;
         let seen = self.visible.distance();
-        if there.iter().any(|&p| f64::from(seen[index(p)]) >= distance - allowed) {
-            return true;
+        let around = [index(left, top), index(right, top), index(left, bottom), index(right, bottom)];
+        let nearest_allowed = (distance - allowed) as f32;
+        if around.iter().any(|&i| seen[i] >= nearest_allowed) {
+            return Seen::Yes;
         }
         // A line at which a body ends may lie a little within its outline on the picture, as faces are flat: it is seen
         // where a pixel next to those shows what is behind.
-        let (x, y) = (pixel[0].floor() as i64, pixel[1].floor() as i64);
-        let beyond = |k: i64| ((x + k % 3 - 1).clamp(0, width - 1), (y + k / 3 - 1).clamp(0, height - 1));
-        if ends && (0..9).any(|k| f64::from(seen[index(beyond(k))]) >= distance - allowed) {
-            return true;
+        let (x, y) = (pixel[0].floor() as i32, pixel[1].floor() as i32);
+        let beyond =
+            |k: i32| index((x + k % 3 - 1).clamp(0, width - 1), (y + k / 3 - 1).clamp(0, height - 1));
+        if ends && (0..9).any(|k| seen[beyond(k)] >= nearest_allowed) {
+            return Seen::Yes;
         }
-        // The surface of a pixel may run away from the eye: where is its plane at the place of the edge?
+        // The surface of a pixel may run away from the eye. A plane says little far from its pixel, though.
+        let far = (distance - allowed - 24.0 * size) as f32;
+        if around.iter().all(|&i| seen[i] < far) {
+            return Seen::FarBehind;
+        }
+        let is_on_plane =
+            around.iter().any(|&i| self.predicts(i, place, (distance, size, allowed), is_parallel));
+        if is_on_plane { Seen::Yes } else { Seen::No }
+    }
+
+    /// Tells whether the plane of a pixel does not hide a place.
+    fn predicts(
+        &self,
+        i: usize,
+        place: DVec3,
+        (distance, size, allowed): (f64, f64, f64),
+        is_parallel: bool,
+    ) -> bool {
+        let width = self.visible.width() as usize;
+        let found = f64::from(self.visible.distance()[i]);
         let direction = if is_parallel {
             self.camera.forward()
         } else {
             self.camera.world_from_camera * place / distance
         };
-        there.iter().any(|&p| {
-            let i = index(p);
-            // A plane says little far from its pixel: what is much farther than it is hidden.
-            if f64::from(seen[i]) + 24.0 * size < distance - allowed {
-                return false;
-            }
-            let Some(ray) = self.view.ray(p.0 as f64 + 0.5, p.1 as f64 + 0.5) else { return false };
-            let normal = self.visible.normal()[i].as_dvec3();
-            let found = f64::from(seen[i]);
-            let slope = normal.dot(direction);
-            if slope > -1e-3 {
-                return false;
-            }
-            let origin = if is_parallel {
-                self.camera.eye + self.camera.world_from_camera * DVec3::new(place.x, place.y, 0.0)
-            } else {
-                ray.origin
-            };
-            let predicted = normal.dot(ray.at(found) - origin) / slope;
-            predicted.min(found + 24.0 * size) >= distance - allowed
-        })
+        let normal = self.visible.normal()[i].as_dvec3();
+        let slope = normal.dot(direction);
+        if slope > -1e-3 || found + 24.0 * size < distance - allowed {
+            return false;
+        }
+        let Some(ray) = self.view.ray((i % width) as f64 + 0.5, (i / width) as f64 + 0.5) else {
+            return false;
+        };
+        let origin = if is_parallel {
+            self.camera.eye + self.camera.world_from_camera * DVec3::new(place.x, place.y, 0.0)
+        } else {
+            ray.origin
+        };
+        let predicted = normal.dot(ray.at(found) - origin) / slope;
+        predicted.min(found + 24.0 * size) >= distance - allowed
     }
 }

@@ -13,7 +13,7 @@ use crate::preset::Preset;
 use crate::stroke::Stroke;
 use crate::style::Styles;
 use glam::DVec3;
-use polyptych_core::camera::Camera;
+use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::parallel::{Threads, for_each_mut};
@@ -329,7 +329,7 @@ impl Buffers {
         let view = camera.view(visible.width(), visible.height());
         let straight = keeps_lines(&camera.projection);
         if straight {
-            let sight = Sight { camera, view, visible, styles: &ready.styles };
+            let sight = Sight { camera, view, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
             outline.fill(&outlines.bodies, &sight, control.threads);
         } else {
             outline.clear();
@@ -339,6 +339,8 @@ impl Buffers {
             visible,
             view,
             styles: &ready.styles,
+            pixel: view.pixel_size(1.0),
+            is_parallel: matches!(camera.projection, Projection::Orthographic { .. }),
             outlined: if straight { &outlines.outlined } else { without },
             colorful: &ready.colorful,
         };

@@ -205,16 +205,16 @@ fn leaks(
                 }
             };
             if x > 0 {
-                visit(x - 1, y)
+                visit(x - 1, y);
             }
             if y > 0 {
-                visit(x, y - 1)
+                visit(x, y - 1);
             }
             if x + 1 < SIZE {
-                visit(x + 1, y)
+                visit(x + 1, y);
             }
             if y + 1 < SIZE {
-                visit(x, y + 1)
+                visit(x, y + 1);
             }
         }
         // Single pixels on the wrong side of a line are its width, no gap.
@@ -224,6 +224,9 @@ fn leaks(
     }
     leaks
 }
+
+/// A name, bodies, what is set, and whether faces are regions.
+type Subject = (&'static str, Vec<(Shape, DVec3)>, &'static [(&'static str, &'static str)], bool);
 
 #[test]
 fn lines_of_flat_crowded_and_crossing_bodies_have_no_gaps() {
@@ -237,7 +240,7 @@ fn lines_of_flat_crowded_and_crossing_bodies_have_no_gaps() {
         ..Mesh::default()
     };
     let two = joined(&[(cube(1.0), Vec3::ZERO), (cube(0.8), Vec3::new(0.1, 1.2, 0.0))]);
-    let shapes: [(&str, Vec<(Shape, DVec3)>, &[(&str, &str)], bool); 5] = [
+    let shapes: [Subject; 5] = [
         ("flat ball", vec![(Shape::Mesh(flat.clone()), DVec3::ZERO)], &[("crease.angle", "5")], true),
         ("fan", vec![(Shape::Mesh(fan), DVec3::ZERO)], &[("crease.angle", "5")], true),
         ("two in one", vec![(Shape::Mesh(two), DVec3::ZERO)], &[], true),
