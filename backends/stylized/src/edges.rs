@@ -174,6 +174,25 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_million_edges_are_found_and_each_once() {
+        let (rings, columns) = (600u32, 600u32);
+        let at = |r: u32, c: u32| r % rings * columns + c % columns;
+        let turn = |i: u32, of: u32| (i as f32 / of as f32 * std::f32::consts::TAU).sin_cos();
+        let mut mesh = Mesh::default();
+        for r in 0..rings {
+            for c in 0..columns {
+                let ((s, t), (u, v)) = (turn(r, rings), turn(c, columns));
+                mesh.positions.push(Vec3::new((2.0 + t) * u, s, (2.0 + t) * v));
+                let [a, b, d, e] = [at(r, c), at(r, c + 1), at(r + 1, c), at(r + 1, c + 1)];
+                mesh.triangles.extend([[a, b, d], [b, e, d]]);
+            }
+        }
+        let edges = Edges::of(&mesh);
+        assert_eq!(edges.edges.len(), 3 * (rings * columns) as usize);
+        assert!(edges.edges.len() > 1_000_000 && edges.is_closed);
+    }
+
+    #[test]
     fn open_crowded_and_turned_edges_are_told() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, -Vec3::Y];
         let mesh =

@@ -165,3 +165,39 @@ fn a_frame_is_stopped_and_the_next_one_is_whole() {
     assert_eq!(easel.renderer.render(&frame, &mut target, &control).unwrap_err(), RenderError::Cancelled);
     assert!(whole.same_bits(&easel.picture()));
 }
+
+#[test]
+fn bodies_smaller_than_a_pixel_and_none_at_all_are_drawn_without_harm() {
+    for radius in [1e-1f64, 1e-2, 1e-3, 1e-6] {
+        let mesh = Shape::Mesh(ball(radius as f32, 8, true));
+        let body = Shape::Primitive(Primitive::Sphere { radius });
+        for (shape, style) in
+            [(mesh.clone(), "ink"), (body.clone(), "ink"), (mesh, "blueprint"), (body, "comic")]
+        {
+            let scene = scene(vec![(shape, DVec3::ZERO)], DVec3::Y);
+            let camera = central(DVec3::new(0.01, 0.02, 3.0), 0.7);
+            let settings = [("preset", style)];
+            let picture = Easel::with_channels(&scene, camera, [61, 43], &settings, Channels::ALL).picture();
+            assert_eq!(picture.count_not_finite(), 0, "{style} {radius}");
+        }
+    }
+    for size in [[0, 0], [1, 1], [1, 37], [37, 1]] {
+        let empty = Arc::new(Scene::default());
+        for scene in [still_life(), empty] {
+            let camera = central(DVec3::new(0.8, 1.6, 4.6), 0.7);
+            let picture =
+                Easel::with_channels(&scene, camera, size, &[("preset", "ink")], Channels::ALL).picture();
+            assert_eq!(picture.count_not_finite(), 0);
+        }
+    }
+}
+
+#[test]
+fn a_body_within_a_pixel_is_a_dot_as_wide_as_its_line() {
+    let scene = scene(vec![(Shape::Mesh(ball(0.01, 8, true)), DVec3::ZERO)], DVec3::Y);
+    let settings = [&common::LINES[..], &[("silhouette.width", "3")]].concat();
+    let picture = Easel::new(&scene, central(DVec3::Z * 3.0, 0.7), [61, 61], &settings).picture();
+    let ink: f32 = picture.color().iter().map(|c| 1.0 - common::luminance(*c)).sum();
+    // A disk of three pixels, and a little for the body itself.
+    assert!((5.0..14.0).contains(&ink), "{ink} pixels of ink");
+}

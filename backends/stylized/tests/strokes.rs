@@ -122,6 +122,37 @@ fn swimming(mapping: &str) -> f64 {
     sum / f64::from(count)
 }
 
+/// Comes nearer by a hundredth with every picture, and returns the greatest change of ink from one to the next, each the
+/// mean over the wall.
+fn popping() -> f32 {
+    let wall = Mesh {
+        positions: [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
+            .map(|[x, y]| Vec3::new(x, y, 0.0))
+            .to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let scene = scene(vec![(Shape::Mesh(wall), DVec3::ZERO)], DVec3::X);
+    let settings = [&STROKES[..], &[("hatch.thresholds", "0.1,0.2,0.3,0.4")]].concat();
+    let mut easel = Easel::new(&scene, central(DVec3::Z * 12.0, 0.5), [128, 128], &settings);
+    let mut mean = |i: i32| {
+        let camera = central(DVec3::Z * 12.0 * 0.99f64.powi(i), 0.5);
+        let picture = easel.picture_from(&camera, &polyptych_core::parallel::OneThread);
+        picture.color().iter().map(|c| 1.0 - luminance(*c)).sum::<f32>() / (128.0 * 128.0)
+    };
+    let means: Vec<f32> = (0..150).map(&mut mean).collect();
+    means.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn strokes_do_not_pop_on_the_way_from_map_to_map() {
+    // Over two halvings of the distance; a map that is changed at once would take or bring half of the ink, a fifth of
+    // the picture.
+    let greatest = popping();
+    println!("the greatest change of ink is {greatest}");
+    assert!(greatest < 0.02, "{greatest}");
+}
+
 /// Most that pictures of an orbit may differ when warped onto each other. Reading between pixels blurs lines two pixels
 /// wide, by about as much; strokes that stay on the picture instead differ by three times that.
 const SWIMS: f64 = 0.06;
