@@ -30,10 +30,9 @@ pub(crate) struct Face {
     normals: [Vec3; 3],
     origin: DVec3,
     edges: [DVec3; 2],
-    pub(crate) id: u32,
     /// Index of its part, and the triangle's in it.
     pub(crate) part: u32,
-    triangle: u32,
+    pub(crate) triangle: u32,
     is_mirrored: bool,
     /// Whether color or opacity change over the triangle.
     pub(crate) is_painted: bool,
@@ -103,7 +102,6 @@ impl Face {
             normals: shading_normals(part, mesh, corners, outward),
             origin: a,
             edges,
-            id,
             part: index as u32,
             triangle: triangle as u32,
             is_mirrored: part.mirrored,

@@ -44,6 +44,8 @@ pub(crate) struct Part {
     reach: f64,
     /// How each slot looks to the camera and to lights.
     classes: Vec<[Class; 2]>,
+    /// Whether color or opacity change over a triangle.
+    pub(crate) is_painted: bool,
     /// Whether light can be blocked on its way to it.
     pub(crate) takes_shadow: bool,
     /// Whether faces that let light through are seen from outside only: one step into a solid is one surface.
@@ -154,6 +156,9 @@ impl Model {
             bounds,
             reach,
             classes: classes(scene, object),
+            is_painted: !mesh.colors.is_empty()
+                || (0..object.materials.len().max(1))
+                    .any(|slot| scene.material(object, slot).texture.is_some()),
             takes_shadow: !matches!(*object.shape, Shape::Volume(_)),
             one_sided_layers: matches!(*object.shape, Shape::Voxels(_)),
             source,
@@ -168,6 +173,14 @@ impl Model {
         let mut parts = self.parts.iter();
         sources.into_iter().all(|source| parts.next().is_some_and(|part| part.source.is(source)))
             && parts.next().is_none()
+    }
+
+    /// Returns the part of a triangle, which is likely the given one.
+    #[inline(always)]
+    pub(crate) fn part_near(&self, part: usize, id: u32) -> usize {
+        let first = self.parts[part].first_triangle;
+        let end = self.parts.get(part + 1).map_or(self.triangles, |next| next.first_triangle);
+        if id >= first && id < end { part } else { self.find(id).0 }
     }
 
     /// Returns the part of a triangle, and the triangle's index in it.
@@ -185,6 +198,16 @@ impl Part {
     /// Returns how a slot takes part in a pass.
     pub(crate) fn class(&self, role: Role, slot: usize) -> Class {
         self.classes.get(slot).unwrap_or(&self.classes[0])[role as usize]
+    }
+
+    /// Tells whether all triangles have one material.
+    pub(crate) fn has_one_slot(&self) -> bool {
+        self.classes.len() == 1
+    }
+
+    /// Tells whether light may pass some of what blocks it.
+    pub(crate) fn has_holes(&self) -> bool {
+        self.classes.iter().any(|of| of[Role::Light as usize] == Class::Layer)
     }
 
     /// Lists how each slot takes part in the passes.
