@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let picture = draw(&mut renderer, scene, style, direction, [wide, high], &pool)?;
             let (left, top) = (GAP + column * (wide + GAP), GAP + row * (high + GAP));
             for (i, color) in (0..).zip(picture.color()) {
-                let bytes = color.to_array().map(|c| encode(c));
+                let bytes = color.to_array().map(encode);
                 sheet.put_pixel(left + i % wide, top + i / wide, image::Rgb(bytes));
             }
         }
