@@ -128,7 +128,7 @@ impl<'a> Painter<'a> {
 
     fn paint_tile(&self, grid: &TileGrid, tile: usize, band: &mut Band<'_>, scratch: &mut Scratch) -> u64 {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if crate::wide::has_avx2() {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for a processor feature can only be called so"
@@ -300,7 +300,7 @@ impl<'a> Painter<'a> {
     /// Finds and lights the surfaces of a batch. This is where most time goes: one kernel, called from everywhere.
     pub(crate) fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if crate::wide::has_avx2() {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for a processor feature can only be called so"
