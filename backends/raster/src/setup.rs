@@ -117,7 +117,7 @@ impl Record {
     /// `reach` is how far from a pixel's center it may be looked at, in steps.
     pub(crate) fn new(
         points: &[ScreenPoint; 3],
-        plane: DepthPlane,
+        plane: impl FnOnce() -> DepthPlane,
         id: u32,
         sides: Sides,
         reach: i32,
@@ -147,8 +147,8 @@ impl Record {
         if reach == 0 && !covers_any(&x, &y) {
             return None;
         }
-        // The plane is that of the corners before they were snapped.
-        let first = points[0];
+        // The plane is that of the corners before they were snapped, found for what is drawn only.
+        let (first, plane) = (points[0], plane());
         let depth = first.depth
             + plane.by_column * (f64::from(x[0]) / steps - first.x)
             + plane.by_row * (f64::from(y[0]) / steps - first.y);
