@@ -14,7 +14,9 @@ use polyptych_core::scene::{Object, Scene};
 use polyptych_core::shade::{fogged, highlight};
 
 /// Rows drawn by one worker at a time.
-pub(crate) const ROWS: u32 = 16;
+pub(crate) const ROWS: u32 = 32;
+/// Columns whose background is filled at once.
+const GROUND: usize = 64;
 
 /// How an object takes paint: what is the same for all its pixels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,6 +86,7 @@ pub(crate) struct Painting<'a> {
     pub(crate) lines: &'a Sheaf,
     /// Nearest and farthest distance of the scene, to show depth.
     pub(crate) depths: [f32; 2],
+    pub(crate) any_coded: bool,
 }
 
 /// Eight pixels of a row.
@@ -252,9 +255,13 @@ impl Painting<'_> {
         let width = colors.len();
         let directions = self.view.row(y);
         let paper = &self.styles.all[0].paper;
-        self.ground(paper, y, directions.as_ref(), colors);
         let row = y as usize * width;
         let ids = &self.visible.id()[row..row + width];
+        for (piece, (ids, colors)) in ids.chunks(GROUND).zip(colors.chunks_mut(GROUND)).enumerate() {
+            if ids.contains(&0) {
+                self.ground(paper, (piece * GROUND) as u32, y, directions.as_ref(), colors);
+            }
+        }
         for x in (0..width).step_by(LANES) {
             let count = (width - x).min(LANES);
             let own_ids = &ids[x..x + count];
@@ -283,17 +290,17 @@ impl Painting<'_> {
 
     /// Fills a row with what is there where nothing is.
     #[inline(always)]
-    fn ground(&self, paper: &Paper, y: u32, directions: Option<&RowDirections>, colors: &mut [Vec3]) {
+    fn ground(&self, paper: &Paper, x: u32, y: u32, directions: Option<&RowDirections>, colors: &mut [Vec3]) {
         let show = self.styles.all[0].show;
         if show != Show::Style {
             colors.fill(Vec3::ZERO);
         } else if paper.is_shown {
-            self.grain.paper(paper, y, colors);
+            self.grain.paper(paper, x, y, colors);
         } else if let Some(directions) = directions {
-            directions.fill(&self.scene.environment.background, 0, colors);
+            directions.fill(&self.scene.environment.background, x, colors);
         } else {
-            for (x, color) in colors.iter_mut().enumerate() {
-                let ray = self.view.ray(x as f64 + 0.5, f64::from(y) + 0.5);
+            for (x, color) in (x..).zip(colors) {
+                let ray = self.view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
                 *color = ray.map_or(Vec3::ZERO, |r| self.scene.environment.background.color(r.direction));
             }
         }
@@ -330,7 +337,7 @@ impl Painting<'_> {
         let ids = &self.visible.id()[first..first + count];
         let mut own = gather(self.visible.albedo(), first, count);
         let coded = own;
-        if ids.iter().any(|&id| self.look(id).is_coded) {
+        if self.any_coded && ids.iter().any(|&id| self.look(id).is_coded) {
             self.decode(eight, &mut own);
         }
         let cosine = F32x8::load(&facing[at..]);
@@ -419,16 +426,22 @@ impl Painting<'_> {
             return color;
         }
         let ids = &self.visible.id()[first..first + count];
-        let (mut strength, mut shininess, mut faint) = (zero, [1.0f32; LANES], zero);
-        for (lane, &id) in ids.iter().enumerate() {
-            let look = &self.looks[(id.wrapping_sub(1) as usize).min(self.looks.len() - 1)];
-            (strength.0[lane], shininess[lane]) = (look.specular, look.shininess);
-            faint.0[lane] = look.faint;
+        let look = |id: u32| &self.looks[(id.wrapping_sub(1) as usize).min(self.looks.len() - 1)];
+        let first_look = look(ids[0].max(1));
+        let mut strength = F32x8::splat(first_look.specular);
+        let mut faint = F32x8::splat(first_look.faint);
+        let mut shininess = [first_look.shininess; LANES];
+        if ids.iter().any(|&id| id != ids[0]) {
+            for (lane, &id) in ids.iter().enumerate() {
+                let look = look(id);
+                (strength.0[lane], faint.0[lane], shininess[lane]) =
+                    (look.specular, look.faint, look.shininess);
+            }
         }
         if !strength.above(zero).any() {
             return color;
         }
-        let directions = self.view.row(y);
+        let directions = if self.light.uniform.is_some() { None } else { self.view.row(y) };
         let toward = self.toward(x as usize, y, count, directions.as_ref());
         let normal = gather(self.visible.normal(), first, count);
         let between = toward - direction;

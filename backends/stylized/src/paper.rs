@@ -42,16 +42,16 @@ impl Grain {
         F32x8::load(&self.heights[y as usize % EDGE * EDGE + x as usize % EDGE..])
     }
 
-    /// Fills a row with paper.
+    /// Fills a part of a row with paper.
     #[inline(always)]
-    pub(crate) fn paper(&self, paper: &Paper, y: u32, colors: &mut [Vec3]) {
+    pub(crate) fn paper(&self, paper: &Paper, first: u32, y: u32, colors: &mut [Vec3]) {
         let (row, strength) = (y as usize % EDGE * EDGE, paper.grain * 0.22);
-        for (x, color) in colors.iter_mut().enumerate() {
+        for (x, color) in (first as usize..).zip(&mut *colors) {
             let height = self.heights[row + x % EDGE];
             *color = paper.color * (1.0 + (height - 0.6) * strength);
         }
         if paper.grid >= 2.0 {
-            grid(paper.grid, y, colors);
+            grid(paper.grid, first, y, colors);
         }
     }
 
@@ -60,8 +60,8 @@ impl Grain {
     }
 }
 
-/// Prints the lines of a grid over a row.
-fn grid(spacing: f32, y: u32, colors: &mut [Vec3]) {
+/// Prints the lines of a grid over a part of a row.
+fn grid(spacing: f32, first: u32, y: u32, colors: &mut [Vec3]) {
     let share = |coordinate: u32| -> f32 {
         let number = (f64::from(coordinate) / f64::from(spacing)).floor() as i64;
         let begins = (number as f64 * f64::from(spacing)).ceil() as i64 == i64::from(coordinate);
@@ -74,8 +74,8 @@ fn grid(spacing: f32, y: u32, colors: &mut [Vec3]) {
         }
     };
     let own = share(y);
-    for (x, color) in colors.iter_mut().enumerate() {
-        let printed = share(x as u32).max(own);
+    for (x, color) in (first..).zip(colors) {
+        let printed = share(x).max(own);
         if printed > 0.0 {
             *color = color.lerp(Vec3::ONE, printed);
         }

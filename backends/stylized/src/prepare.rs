@@ -150,7 +150,8 @@ pub(crate) fn looks(scene: &Scene, coded: &[bool]) -> Vec<Look> {
         let radius = object.shape.bounds().radius();
         Look {
             specular: material.specular,
-            shininess: material.shininess,
+            // A whole one is raised to in a few steps, and nobody sees the difference.
+            shininess: material.shininess.round().clamp(1.0, 65536.0),
             faint: 0.002f32.powf(1.0 / material.shininess.max(1e-3)),
             is_coded: coded.get(index).copied().unwrap_or(false),
             period: if radius > 0.0 && radius.is_finite() { radius * 2.0 } else { 1.0 },

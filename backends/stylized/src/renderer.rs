@@ -396,6 +396,7 @@ impl Buffers {
             grain,
             lines: &self.lines,
             depths,
+            any_coded: self.looks.iter().any(|look| look.is_coded),
         };
         let bands = &self.bands;
         target.for_each_band(control.threads, ROWS, &|mut band| {
