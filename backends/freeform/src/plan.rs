@@ -19,8 +19,8 @@ mod nanoseconds {
     pub(super) const PLANE: f64 = 20.0;
     /// A ray against a height field, for each doubling of its columns.
     pub(super) const HEIGHTS: f64 = 80.0;
-    /// A ray into a grid of distances, for each sample along its longest edge.
-    pub(super) const FIELD: f64 = 9.0;
+    /// A ray through a grid of distances, for each sample on its way.
+    pub(super) const FIELD: f64 = 13.0;
     /// A sample of a volume, with what it takes to light it.
     pub(super) const SAMPLE: f64 = 45.0;
     /// A surface.
@@ -96,17 +96,14 @@ fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, volume_step: f64, e
         Shape::Primitive(body) => FORM + FUNCTION * body.faces().len().max(1) as f64,
         Shape::FreeForm(form) => FORM + FUNCTION * form.form().node_count() as f64,
         Shape::HeightField(field) => HEIGHTS * f64::from(field.columns().max(2)).log2(),
-        Shape::Mesh(_) | Shape::Voxels(_) => FIELD * edges[index],
+        // Over so much of its longest edge a ray passes through the box.
+        Shape::Mesh(_) | Shape::Voxels(_) => {
+            let longest = object.bounds().size().max_element().max(1e-300);
+            FIELD * edges[index] * (survey.length[index] / longest).min(2.0)
+        }
         Shape::Volume(_) => 0.0,
     };
-    let volume_of = |index: usize, object: &Object| match &*object.shape {
-        Shape::Volume(volume) => {
-            let scale = object.world_from_object.matrix3.determinant().abs().cbrt();
-            let step = volume.spacing().min_element() * scale * volume_step;
-            SAMPLE * survey.length[index] / step.max(1e-300)
-        }
-        _ => 0.0,
-    };
+    let volume_of = |index: usize, object: &Object| SAMPLE * survey.samples(index, object, volume_step);
     let rays = survey.sum(scene, surface_of);
     // A shadow ray passes what a ray of the picture passes, where there is anything.
     let shadow = rays / survey.entered.max(1e-3);

@@ -6,6 +6,7 @@
 //! as long as the shape lives, and shared by all who ask again.
 
 mod cache;
+mod chunks;
 mod distance;
 mod field_mesh;
 mod height_mesh;
@@ -115,6 +116,9 @@ pub struct DistanceModel {
     pub colors: Vec<u8>,
     /// Materials of the surface.
     pub palette: Vec<Material>,
+    /// Half of the thickness, object space, that a surface which encloses nothing was given so that it has an inside;
+    /// 0 for bodies. The surface itself lies in the middle.
+    pub half_sheet: f64,
     /// Bound on the distance between the surfaces, in world space.
     pub bound: f64,
     /// What was done, for the report.
@@ -312,11 +316,8 @@ impl Converter {
         let scale = scale_of(object);
         let tolerance = detail.in_object(object);
         let (size, cell) = voxelize::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
-        let chunks = match &*object.shape {
-            Shape::FreeForm(form) => voxelize::chunks_of_form(form, size, cell),
-            _ => size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>(),
-        };
-        let bytes = chunks * u64::from(crate::scene::CHUNK).pow(3);
+        let grid = voxelize::Grid::around(&object.shape.bounds(), size, cell);
+        let bytes = chunks::taken(scene, object, &grid) * u64::from(crate::scene::CHUNK).pow(3);
         let [x, y, z] = size;
         Forecast::of_grid(bytes, cell * 3f64.sqrt() * scale, format!("{x}x{y}x{z} voxels"))
     }

@@ -61,7 +61,10 @@ impl Voxels {
                     cells[cell_index(0, y, z)..][..row.len()].copy_from_slice(row);
                 }
             }
-            if cells.iter().any(|&b| b != 0) {
+            // Cells beyond the grid are empty: only whole chunks are one value.
+            if cells.iter().all(|&b| b == cells[0]) {
+                grid.chunks[index] = Chunk::Uniform(cells[0]);
+            } else {
                 grid.chunks[index] = Chunk::Cells(cells.into());
             }
         }

@@ -4,7 +4,7 @@
 use super::demand::why_not_drawn;
 use super::need::Need;
 use crate::math::Aabb;
-use crate::scene::{Object, Primitive, Scene, Shape};
+use crate::scene::{Object, Primitive, Scene, Shape, Volume};
 
 /// What the rays of a picture are likely to meet.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -78,12 +78,40 @@ impl Survey {
         survey
     }
 
+    /// Returns how many samples a ray takes of a volume, `step` spacings apart: where there is something to be seen, and few
+    /// where there is nothing.
+    #[must_use]
+    pub fn samples(&self, index: usize, object: &Object, step: f64) -> f64 {
+        let Shape::Volume(volume) = &*object.shape else { return 0.0 };
+        let scale = object.world_from_object.matrix3.determinant().abs().cbrt();
+        let all = self.length[index] / (volume.spacing().min_element() * scale * step).max(1e-300);
+        all * (EMPTY + (1.0 - EMPTY) * occupied(volume))
+    }
+
     /// Sums what the picture's rays cost: `cost` is that of one ray against an object.
     #[must_use]
     pub fn sum(&self, scene: &Scene, cost: impl Fn(usize, &Object) -> f64) -> f64 {
         let things = scene.objects.iter().enumerate().zip(&self.tested);
         things.filter(|(_, tested)| **tested > 0.0).map(|((i, o), tested)| tested * cost(i, o)).sum()
     }
+}
+
+/// What it takes to pass by a sample in empty space, against one that is seen.
+const EMPTY: f64 = 0.15;
+
+/// Returns the share of a volume's samples that are seen, from some of them.
+fn occupied(volume: &Volume) -> f64 {
+    /// Most samples that are looked at.
+    const MOST: usize = 1 << 16;
+    let all = volume.samples().len();
+    // An odd stride does not stay in one column.
+    let stride = (all / MOST) | 1;
+    let (mut seen, mut looked) = (0u32, 0u32);
+    for i in (0..all).step_by(stride) {
+        looked += 1;
+        seen += u32::from(volume.transfer.at(volume.samples().get(i)).1 > 0.0);
+    }
+    f64::from(seen) / f64::from(looked.max(1))
 }
 
 /// Returns the box of an object that is drawn, and the share of rays into it that meet its surface.
