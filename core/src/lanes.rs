@@ -245,6 +245,14 @@ impl F64x8 {
         Self(lanes!(0.0, i => self.0[i].sqrt()))
     }
 
+    /// Rounds numbers less than 2^31 from zero to the nearest whole ones, of two equally near to the even one.
+    #[must_use]
+    #[inline(always)]
+    pub fn nearest(self) -> I32x8 {
+        // Adding 1.5 * 2^52 leaves whole numbers in the low bits. A cast would saturate, which is done one by one.
+        I32x8(lanes!(0, i => (self.0[i] + 6_755_399_441_055_744.0).to_bits() as i32))
+    }
+
     /// Rounds to single precision.
     #[must_use]
     #[inline(always)]
@@ -261,11 +269,11 @@ impl I32x8 {
         Self::splat(first) + Self([0, 1, 2, 3, 4, 5, 6, 7])
     }
 
-    /// Tells which are not negative.
+    /// Tells which are negative.
     #[must_use]
     #[inline(always)]
-    pub fn not_negative(self) -> Mask8 {
-        Mask8(lanes!(0_u32, i => if self.0[i] >= 0 { u32::MAX } else { 0 }))
+    pub fn is_negative(self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => (self.0[i] >> 31) as u32))
     }
 
     /// Turns them into numbers in double precision.
@@ -306,13 +314,6 @@ impl Mask8 {
     pub fn load(from: &[u32]) -> Self {
         let from: &[u32; LANES] = from[..LANES].try_into().expect("a slice of eight");
         Self(*from)
-    }
-
-    /// Tells which words are greater than one.
-    #[must_use]
-    #[inline(always)]
-    pub fn above(self, word: u32) -> Self {
-        Self(lanes!(0_u32, i => if self.0[i] > word { u32::MAX } else { 0 }))
     }
 
     /// Tells whether there is one.
@@ -505,7 +506,7 @@ mod tests {
         assert_eq!(a.finite().0[5], 1e30);
         assert!(a.above(b).any() && !(a.above(b) & Mask8::NONE).any());
         let count = I32x8::count_from(-3);
-        assert_eq!(count.not_negative().0, [0, 0, 0, u32::MAX, u32::MAX, u32::MAX, u32::MAX, u32::MAX]);
+        assert_eq!((!count.is_negative()).0, [0, 0, 0, u32::MAX, u32::MAX, u32::MAX, u32::MAX, u32::MAX]);
         assert_eq!(count.to_f64().round().0[7], 4.0);
         let wide = F32x8([1.0, -2.0, 3.5, 0.0, f32::NAN, 1e30, -0.0, 8.0]).to_f64();
         let two = F64x8::splat(2.0);
@@ -513,6 +514,8 @@ mod tests {
         assert_eq!(F64x8::pick(wide.above(two), wide, two).round(), a.above(b).pick(a, b));
         assert_eq!(wide.min(two).max(-two).0, [1.0, -2.0, 2.0, 0.0, 2.0, 2.0, 0.0, 2.0]);
         assert_eq!((Mask8::first(3).count(), Mask8::ALL.count()), (3, 8));
+        let halves = F64x8([0.5, -0.5, 1.5, 2.4, -2.6, 1e9, -1e9, 0.0]);
+        assert_eq!(halves.nearest().0, [0, 0, 2, 2, -3, 1_000_000_000, -1_000_000_000, 0]);
         let turn = glam::DMat3::from_rotation_z(0.3);
         let turned = DVec3x8::splat(glam::DVec3::new(1.0, 2.0, 3.0)).turned(&turn);
         assert_eq!(turned.get(5), turn * glam::DVec3::new(1.0, 2.0, 3.0));

@@ -7,7 +7,7 @@ use divan::Bencher;
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
-use polyptych_core::framebuffer::Framebuffer;
+use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::parallel::Pool;
 use polyptych_core::scene::{Light, Material, Mesh, Object, Primitive, Scene, Shape};
 use polyptych_core::seam::{Control, Need, Renderer};
@@ -43,6 +43,33 @@ fn ball() -> Mesh {
     mesh
 }
 
+/// Right triangles of random places and turns on a picture of 1920x1080, each in front of those before it, so that
+/// every pixel of each is drawn; legs are in pixels.
+fn scattered(count: usize, legs: f64) -> Mesh {
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut random = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 40) as f64 / f64::from(1 << 24)
+    };
+    let mut mesh = Mesh::default();
+    for i in 0..count as u32 {
+        let corners = loop {
+            let (x, y) = (random() * 1920.0 - 960.0, random() * 1080.0 - 540.0);
+            let (sin, cos) = (random() * std::f64::consts::TAU).sin_cos();
+            let corners = [[x, y], [x + legs * cos, y + legs * sin], [x - legs * sin, y + legs * cos]];
+            if corners.iter().all(|[x, y]| x.abs() < 960.0 && y.abs() < 540.0) {
+                break corners;
+            }
+        };
+        let height = f64::from(i) / count as f64;
+        mesh.positions.extend(corners.map(|[x, y]| DVec3::new(x, y, height).as_vec3()));
+        mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    mesh
+}
+
 /// A scene, the need of its picture, and a renderer that has prepared it.
 struct Stage {
     scene: Scene,
@@ -62,14 +89,31 @@ impl Stage {
         scene.lights.push(Light::directional(DVec3::new(-0.5, -0.8, -0.3)));
         let view = Projection::Perspective { fov_y: 0.7 };
         let camera = Camera::look_at(DVec3::new(1.6, 1.1, 2.6), DVec3::new(0.0, -0.15, 0.0), DVec3::Y, view);
-        let mut need = Need::new(camera, 1280, 720);
+        Self::of(scene, Need::new(camera, 1280, 720), settings, 0)
+    }
+
+    /// Shows nothing but which object is where.
+    fn of_scattered(legs: f64, threads: usize) -> Self {
+        let mut scene = Scene::default();
+        let clay = scene.add_material(Material::new(Vec3::splat(0.5)));
+        let mesh = Shape::Mesh(scattered(count_of(legs), legs));
+        scene.objects.push(Object::new("triangles", mesh, clay));
+        let view = Projection::Orthographic { height: 1080.0 };
+        let camera = Camera::look_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, DVec3::Y, view);
+        let mut need = Need::new(camera, 1920, 1080);
+        need.channels = Channels::NONE.with(Channel::Id);
+        Self::of(scene, need, &[], threads)
+    }
+
+    /// Prepares a scene; no number of threads means all.
+    fn of(scene: Scene, mut need: Need, settings: &[(&str, &str)], threads: usize) -> Self {
         let mut raster = Raster::new();
         for (name, value) in settings {
             let declared = raster.info().parameters.clone();
             need.settings.set("raster", &declared, name, value).expect("a parameter");
         }
         let picture = Framebuffer::new(need.width, need.height, need.channels);
-        let pool = Pool::new(0).expect("threads");
+        let pool = Pool::new(threads).expect("threads");
         let all = Arc::new(scene.clone());
         raster.prepare(&all, &need, &Converter::default(), &Control::new(&pool)).expect("a scene");
         Self { scene, need, pool, raster, picture }
@@ -84,6 +128,19 @@ impl Stage {
         let control = Control::new(&self.pool);
         self.raster.render(&self.need.frame(), &mut self.picture, &control).expect("a picture");
     }
+}
+
+/// Fewer large triangles than small ones.
+fn count_of(legs: f64) -> usize {
+    ((4e7 / (legs * legs)) as usize).clamp(2000, 400_000)
+}
+
+/// Visibility alone: triangles a second. Legs in pixels, on one thread and on two.
+#[divan::bench(args = [4, 10, 25, 50, 100, 250, 500], consts = [1, 2])]
+fn scattered_triangles<const THREADS: usize>(bencher: Bencher, legs: u32) {
+    let mut stage = Stage::of_scattered(f64::from(legs), THREADS);
+    let triangles = count_of(f64::from(legs));
+    bencher.counter(divan::counter::ItemsCount::new(triangles)).bench_local(|| stage.render());
 }
 
 /// A frame in each mode, with nothing to prepare.

@@ -3,7 +3,7 @@
 //! All fragments of a tile are kept and sorted, so any number of layers is right whatever the order of triangles.
 
 use crate::setup::Record;
-use crate::tile::{TileArea, TileBuffer, for_each_span};
+use crate::tile::{Spans, TileArea, TileBuffer};
 
 /// A triangle on a pixel. The order of the fields is the order of drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,7 +17,7 @@ pub(crate) struct Fragment {
 
 /// Collects the fragments of a triangle that the solid surfaces of the tile do not hide.
 pub(crate) fn collect(fragments: &mut Vec<Fragment>, record: &Record, area: &TileArea, solid: &TileBuffer) {
-    for_each_span(record, area, |span| {
+    for span in Spans::of(record, area).iter() {
         let row = record.depth_of_row(span.y);
         for i in 0..span.length {
             let depth = record.hold(row + record.depth_of_column(span.x + i as i32));
@@ -28,7 +28,7 @@ pub(crate) fn collect(fragments: &mut Vec<Fragment>, record: &Record, area: &Til
                 fragments.push(Fragment { pixel: pixel as u32, far: !ordered(depth), id: record.id });
             }
         }
-    });
+    }
 }
 
 /// Sorts fragments by pixel, then from front to back, then by id.

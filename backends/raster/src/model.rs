@@ -170,6 +170,14 @@ impl Model {
             && parts.next().is_none()
     }
 
+    /// Returns the part of a triangle, which is likely the given one.
+    #[inline(always)]
+    pub(crate) fn part_near(&self, part: usize, id: u32) -> usize {
+        let first = self.parts[part].first_triangle;
+        let end = self.parts.get(part + 1).map_or(self.triangles, |next| next.first_triangle);
+        if id >= first && id < end { part } else { self.find(id).0 }
+    }
+
     /// Returns the part of a triangle, and the triangle's index in it.
     pub(crate) fn find(&self, id: u32) -> (usize, usize) {
         let part = self.parts.partition_point(|p| p.first_triangle <= id).saturating_sub(1);

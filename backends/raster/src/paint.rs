@@ -161,10 +161,8 @@ impl<'a> Painter<'a> {
     ) -> u64 {
         let area = grid.area(tile);
         // 1. Visibility: the nearest solid triangle of each pixel.
-        let mut buffer = TileBuffer::new();
-        if self.drawing.is_none_or(|drawing| drawing.hides) {
-            buffer.draw_here(self.bins.solid(tile), &area);
-        }
+        let hides = self.drawing.is_none_or(|drawing| drawing.hides);
+        let buffer = TileBuffer::of_here(self.bins.solid(tile).take_while(|_| hides).copied(), &area);
         // 2. What light may pass through, in front of it. It hides no line.
         scratch.fragments.clear();
         for record in self.bins.layers(tile).take_while(|_| self.drawing.is_none()) {
@@ -204,6 +202,9 @@ impl<'a> Painter<'a> {
             return 0;
         }
         // 3. Resolve: surfaces and their light, for what is visible only.
+        if fragments.is_empty() && self.names_only() {
+            return self.name(area, buffer, band);
+        }
         let layers = Layers::default();
         let mut tile = TilePainter { painter: self, area: *area, band, faces, corners, layers, shaded: 0 };
         if fragments.is_empty() {
@@ -222,6 +223,33 @@ impl<'a> Painter<'a> {
             }
         }
         tile.shaded
+    }
+
+    /// Tells whether nothing is asked but which objects are seen.
+    fn names_only(&self) -> bool {
+        let asked = [Channel::Color, Channel::Distance, Channel::Normal, Channel::Albedo, Channel::Shadow];
+        !asked.into_iter().any(|channel| self.channels.has(channel)) && self.drawing.is_none()
+    }
+
+    /// Names the objects of a tile and returns the number of pixels that they take.
+    fn name(&self, area: &TileArea, buffer: &TileBuffer, band: &mut Band<'_>) -> u64 {
+        let (model, mut shaded, mut part) = (self.light.model, 0, 0);
+        for row in 0..area.height as usize {
+            let at =
+                (area.y as usize + row - band.first_row as usize) * band.width as usize + area.x as usize;
+            let ids = &buffer.id[row * TILE_WIDTH as usize..][..area.width as usize];
+            for (pixel, &id) in (at..).zip(ids).filter(|(_, id)| **id != NO_TRIANGLE) {
+                part = model.part_near(part, id);
+                if let Some(object) = band.id.get_mut(pixel) {
+                    *object = model.parts[part].object as u32 + 1;
+                }
+                if let Some(coverage) = band.coverage.get_mut(pixel) {
+                    *coverage = 1.0;
+                }
+                shaded += 1;
+            }
+        }
+        shaded
     }
 
     /// Fills a row of a tile with what is seen where nothing is: most pixels of most pictures keep it.

@@ -443,8 +443,7 @@ fn draw(
 ) {
     for_each_mut(threads, tiles, 4, &|index, tile| {
         let area = grid.area(index);
-        let mut buffer = TileBuffer::new();
-        buffer.draw(bins.solid(index), &area);
+        let mut buffer = TileBuffer::of(bins.solid(index).copied(), &area);
         for record in bins.layers(index) {
             let face = Face::new(scene, pass.model, pass.lens, record.id);
             buffer.draw_where(record, &area, |x, y| {

@@ -60,10 +60,8 @@ impl Smooth {
         self.layers.resize_with(places.len(), Vec::new);
         let mut mixed = [false; TILE_PIXELS];
         for (i, place) in places.iter().enumerate() {
-            let mut buffer = TileBuffer::new();
-            for record in bins.solid(tile) {
-                buffer.draw_record(&record.seen_from(*place), area);
-            }
+            let moved = bins.solid(tile).map(|record| record.seen_from(*place));
+            let buffer = TileBuffer::of_here(moved, area);
             let of_place = &mut self.layers[i];
             of_place.clear();
             for record in bins.layers(tile) {

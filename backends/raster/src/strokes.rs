@@ -65,6 +65,10 @@ impl Placed for Stroke {
         };
         (range(self.from.x, to.x), range(self.from.y, to.y))
     }
+
+    fn may_cover(&self, _columns: [i32; 2], _rows: [i32; 2]) -> bool {
+        true
+    }
 }
 
 impl Strokes {

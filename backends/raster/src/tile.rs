@@ -58,6 +58,9 @@ pub(crate) struct Span {
 pub(crate) trait Placed {
     /// Returns the first and last column and row that it can cover; maybe none.
     fn pixels(&self) -> ([i32; 2], [i32; 2]);
+
+    /// Tells whether it may cover pixels of a box that it was found to reach into; asked where it reaches into many.
+    fn may_cover(&self, columns: [i32; 2], rows: [i32; 2]) -> bool;
 }
 
 impl TileGrid {
@@ -95,11 +98,27 @@ impl TileGrid {
         if x0 > x1 || y0 > y1 {
             return;
         }
-        for row in y0 as u32 / TILE_HEIGHT..=y1 as u32 / TILE_HEIGHT {
-            for column in x0 as u32 / TILE_WIDTH..=x1 as u32 / TILE_WIDTH {
-                touch((row * self.columns + column) as usize);
+        let (rows, columns) = (
+            y0 as u32 / TILE_HEIGHT..=y1 as u32 / TILE_HEIGHT,
+            x0 as u32 / TILE_WIDTH..=x1 as u32 / TILE_WIDTH,
+        );
+        let is_one_line = columns.start() == columns.end() || rows.start() == rows.end();
+        for row in rows {
+            for column in columns.clone() {
+                let tile = (row * self.columns + column) as usize;
+                if is_one_line || self.may_touch(record, tile) {
+                    touch(tile);
+                }
             }
         }
+    }
+}
+
+impl TileGrid {
+    fn may_touch(&self, record: &impl Placed, tile: usize) -> bool {
+        let (area, m) = (self.area(tile), self.margin);
+        let columns = [area.x - m, area.x + area.width - 1 + m];
+        record.may_cover(columns, [area.y - m, area.y + area.height - 1 + m])
     }
 }
 
@@ -128,25 +147,30 @@ impl Edge {
         Self { value: exact >> 8, by_column, by_row }
     }
 
-    /// Narrows a span `first..=last` of columns to the inside of the edge; `inverse` is `1 / |by_column|`.
+    /// Narrows the columns that are inside of all edges, from `before` to before `end` when both are rounded down;
+    /// `rows` are counted from that of the edge, and `inverse` is `1 / |by_column|`.
     ///
-    /// Adding a half before dividing keeps quotients clear of whole numbers by more than the rounding error.
-    fn narrow(&self, inverse: f64, first: &mut i32, last: &mut i32) {
+    /// Adding a half before dividing keeps quotients clear of whole numbers by `inverse / 2`, more than the rounding
+    /// error.
+    #[inline(always)]
+    fn narrow(&self, rows: F64x8, inverse: f64, before: &mut F64x8, end: &mut F64x8) {
+        let value = F64x8::splat(self.value as f64 + 0.5) + F64x8::splat(self.by_row as f64) * rows;
+        let column = value * F64x8::splat(inverse);
         if self.by_column > 0 {
-            if self.value < 0 {
-                let steps = ((-self.value) as f64 - 0.5) * inverse;
-                *first = (*first).max((steps as i32).saturating_add(1));
-            }
-        } else if self.value < 0 {
-            *last = -1;
-        } else if self.by_column < 0 {
-            *last = (*last).min(((self.value as f64 + 0.5) * inverse) as i32);
+            *before = before.max(F64x8::splat(1.0) - column);
+        } else {
+            *end = end.min(F64x8::splat(1.0) + column);
         }
     }
 }
 
+/// Less than a half by less than quotients of [`Edge::narrow`] are clear of whole numbers: what is left of them without
+/// it is nearest to what they are rounded down.
+const ALMOST_HALF: f64 = 0.5 - 1.0 / (1u64 << 34) as f64;
 /// Columns that are tested at once.
 const BLOCK: usize = LANES;
+/// Blocks in a row of a tile.
+const BLOCKS: usize = TILE_WIDTH as usize / BLOCK;
 /// Triangles wider than this on a tile are drawn row by row, each as a span.
 const WIDEST_IN_BLOCKS: i32 = 16;
 
@@ -171,6 +195,15 @@ impl Pixels {
 impl Placed for Record {
     fn pixels(&self) -> ([i32; 2], [i32; 2]) {
         self.pixels()
+    }
+
+    /// No edge has the whole box on its outside.
+    fn may_cover(&self, columns: [i32; 2], rows: [i32; 2]) -> bool {
+        (0..3).all(|corner| {
+            let edge = Edge::new(self, corner, columns[0], rows[0]);
+            let most = |by: i64, of: [i32; 2]| by.max(0) * i64::from(of[1] - of[0]);
+            edge.value + most(edge.by_column, columns) + most(edge.by_row, rows) >= 0
+        })
     }
 }
 
@@ -215,37 +248,58 @@ impl Blocks {
     }
 }
 
-/// Calls `visit` for every row of pixels of a tile that a triangle covers, exactly.
-pub(crate) fn for_each_span(record: &Record, area: &TileArea, mut visit: impl FnMut(Span)) {
-    let Some(Pixels { x0, x1, y0, y1 }) = Pixels::of(record, area) else { return };
-    let edge = |corner| Edge::new(record, corner, x0, y0);
-    let mut edges = [edge(0), edge(1), edge(2)];
-    let inverses = edges.map(|edge| 1.0 / edge.by_column.abs() as f64);
-    for y in y0..=y1 {
-        let (mut first, mut last) = (0, x1 - x0);
-        for (edge, inverse) in edges.iter_mut().zip(inverses) {
-            edge.narrow(inverse, &mut first, &mut last);
-            edge.value += edge.by_row;
+/// The rows of pixels of a tile that a triangle covers, exactly.
+pub(crate) struct Spans {
+    area: TileArea,
+    x0: i32,
+    y0: i32,
+    y1: i32,
+    /// For each row how many columns from `x0` on lie before what is covered, and before its end.
+    before: [i32; TILE_HEIGHT as usize],
+    end: [i32; TILE_HEIGHT as usize],
+}
+
+impl Spans {
+    #[inline(always)]
+    pub(crate) fn of(record: &Record, area: &TileArea) -> Self {
+        const ROWS: usize = TILE_HEIGHT as usize;
+        let mut spans = Self { area: *area, x0: 0, y0: 0, y1: -1, before: [0; ROWS], end: [0; ROWS] };
+        let Some(Pixels { x0, x1, y0, y1 }) = Pixels::of(record, area) else { return spans };
+        (spans.x0, spans.y0, spans.y1) = (x0, y0, y1);
+        let edge = |corner| Edge::new(record, corner, x0, y0);
+        let edges = [edge(0), edge(1), edge(2)];
+        // Where all columns of a row are inside of an edge that runs along it, its quotient is infinite.
+        let inverses = edges.map(|edge| 1.0 / edge.by_column.abs() as f64);
+        let widest = F64x8::splat(f64::from(x1 - x0 + 1));
+        let half = F64x8::splat(ALMOST_HALF);
+        for first in (0..(y1 - y0 + 1) as usize).step_by(LANES) {
+            let rows = I32x8::count_from(first as i32).to_f64();
+            let (mut before, mut end) = (F64x8::ZERO, widest);
+            for k in 0..3 {
+                edges[k].narrow(rows, inverses[k], &mut before, &mut end);
+            }
+            (before.min(widest) - half).nearest().store(&mut spans.before[first..]);
+            (end.max(F64x8::ZERO) - half).nearest().store(&mut spans.end[first..]);
         }
-        if first <= last {
-            let x = x0 + first;
-            visit(Span {
-                first: ((y - area.y) * TILE_WIDTH as i32 + x - area.x) as usize,
-                length: (last - first + 1) as usize,
-                x,
-                y,
-            });
-        }
+        spans
+    }
+
+    /// Lists those that are not empty.
+    #[inline(always)]
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Span> {
+        (self.y0..=self.y1).filter_map(|y| {
+            let row = (y - self.y0) as usize;
+            let (before, end) = (self.before[row], self.end[row]);
+            let x = self.x0 + before;
+            let first = ((y - self.area.y) * TILE_WIDTH as i32 + x - self.area.x) as usize;
+            (before < end).then(|| Span { first, length: (end - before) as usize, x, y })
+        })
     }
 }
 
 impl TileBuffer {
-    pub(crate) fn new() -> Self {
-        Self { depth: [f32::NEG_INFINITY; TILE_PIXELS], id: [NO_TRIANGLE; TILE_PIXELS] }
-    }
-
-    /// Draws solid triangles. Of equal depths the lower id wins, so their order does not matter.
-    pub(crate) fn draw<'r>(&mut self, records: impl Iterator<Item = &'r Record>, area: &TileArea) {
+    /// Draws solid triangles, listed by rising ids: of equal depths the lowest wins.
+    pub(crate) fn of(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             #[expect(
@@ -253,51 +307,77 @@ impl TileBuffer {
                 reason = "a kernel compiled for a processor feature can only be called so"
             )]
             // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.draw_avx2(records, area) };
+            return unsafe { Self::of_avx2(records, area) };
         }
-        self.draw_here(records, area);
+        Self::of_here(records, area)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn draw_avx2<'r>(&mut self, records: impl Iterator<Item = &'r Record>, area: &TileArea) {
-        self.draw_here(records, area);
+    fn of_avx2(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
+        Self::of_here(records, area)
     }
 
     /// The same in the caller's instructions.
     #[inline(always)]
-    pub(crate) fn draw_here<'r>(&mut self, records: impl Iterator<Item = &'r Record>, area: &TileArea) {
+    pub(crate) fn of_here(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
+        let mut buffer = Self { depth: [f32::NEG_INFINITY; TILE_PIXELS], id: [NO_TRIANGLE; TILE_PIXELS] };
+        // The compiler would make masked stores where something is kept or put back, and these take some processors
+        // a dozen cycles each. It cannot where it does not know that both places are the same.
+        let apart = std::hint::black_box(0);
         for record in records {
-            self.draw_record(record, area);
+            buffer.draw(&record, area, apart);
         }
+        buffer
     }
 
     /// Draws a solid triangle.
     #[inline(always)]
-    pub(crate) fn draw_record(&mut self, record: &Record, area: &TileArea) {
+    fn draw(&mut self, record: &Record, area: &TileArea, apart: usize) {
         let Some(pixels) = Pixels::of(record, area) else { return };
         match Blocks::new(record, area, &pixels) {
-            Some(blocks) => self.draw_blocks(record, area, &pixels, &blocks),
-            None => for_each_span(record, area, |span| self.draw_span(record, &span)),
+            Some(blocks) => self.draw_blocks(record, area, &pixels, &blocks, apart),
+            None => self.draw_spans(record, area, &pixels, apart),
         }
     }
 
+    /// Draws a triangle row by row. What columns add to depths is found once for all rows.
     #[inline(always)]
-    fn draw_span(&mut self, record: &Record, span: &Span) {
-        let pixels = span.first..span.first + span.length;
-        let row = record.depth_of_row(span.y);
-        let targets = self.depth[pixels.clone()].iter_mut().zip(&mut self.id[pixels]);
-        for (i, (depth, id)) in targets.enumerate() {
-            let new = record.hold(row + record.depth_of_column(span.x + i as i32));
-            let wins = (new > *depth) | ((new == *depth) & (record.id < *id));
-            *depth = if wins { new } else { *depth };
-            *id = if wins { record.id } else { *id };
+    fn draw_spans(&mut self, record: &Record, area: &TileArea, pixels: &Pixels, apart: usize) {
+        let mut columns = [F64x8::ZERO; BLOCKS];
+        let block = |x: i32| (x - area.x) as usize / BLOCK;
+        for block in block(pixels.x0)..=block(pixels.x1) {
+            columns[block] = record.depth_of_columns(area.x + (block * BLOCK) as i32);
+        }
+        for span in Spans::of(record, area).iter() {
+            let row = F64x8::splat(record.depth_of_row(span.y));
+            let begin = span.first % TILE_WIDTH as usize;
+            let (line, end) = (span.first - begin, begin + span.length);
+            for block in begin / BLOCK..end.div_ceil(BLOCK) {
+                let first = block * BLOCK;
+                let at = line + first;
+                let depth = record.hold_all(row + columns[block]);
+                let mut outside = Mask8::NONE;
+                if first < begin || first + BLOCK > end {
+                    let past = I32x8::count_from(first as i32) - I32x8::splat(begin as i32);
+                    let before = I32x8::splat(end as i32 - 1) - I32x8::count_from(first as i32);
+                    outside = (past | before).is_negative();
+                }
+                self.draw_block(at, apart, depth, outside, record.id);
+            }
         }
     }
 
     /// Draws a small triangle by testing all pixels of a few columns at once.
     #[inline(always)]
-    fn draw_blocks(&mut self, record: &Record, area: &TileArea, pixels: &Pixels, blocks: &Blocks) {
+    fn draw_blocks(
+        &mut self,
+        record: &Record,
+        area: &TileArea,
+        pixels: &Pixels,
+        blocks: &Blocks,
+        apart: usize,
+    ) {
         let mut first = pixels.x0;
         while first <= pixels.x1 {
             // A block that would pass the tile's end begins earlier: drawing a pixel twice changes nothing.
@@ -309,19 +389,23 @@ impl TileBuffer {
             let columns = record.depth_of_columns(x);
             for y in pixels.y0..=pixels.y1 {
                 let at = ((y - area.y) * TILE_WIDTH as i32 + x - area.x) as usize;
-                let (depths, ids) = (&mut self.depth[at..at + BLOCK], &mut self.id[at..at + BLOCK]);
-                let new = record.hold_all(F64x8::splat(record.depth_of_row(y)) + columns);
-                let old = F32x8::load(depths);
-                let old_ids = Mask8::load(ids);
-                let first = old_ids.above(record.id);
-                let nearer = new.above(old) | (new.equal(old) & first);
-                let wins = nearer & (a | b | c | within).not_negative();
-                wins.pick(new, old).store(depths);
-                ids.copy_from_slice(&wins.pick_bits(Mask8([record.id; BLOCK]), old_ids).0);
+                let depth = record.hold_all(F64x8::splat(record.depth_of_row(y)) + columns);
+                self.draw_block(at, apart, depth, (a | b | c | within).is_negative(), record.id);
                 (a, b, c) = (a + down_a, b + down_b, c + down_c);
             }
             first += BLOCK as i32;
         }
+    }
+
+    /// Draws eight pixels of a triangle where they are not outside of it, and nearer than what is there. `apart` is
+    /// zero; see [`TileBuffer::of_here`].
+    #[inline(always)]
+    fn draw_block(&mut self, at: usize, apart: usize, depth: F32x8, outside: Mask8, id: u32) {
+        let (old, old_ids) = (F32x8::load(&self.depth[at..]), Mask8::load(&self.id[at..]));
+        let wins = depth.above(old) & !outside;
+        let to = at + apart..at + apart + BLOCK;
+        wins.pick(depth, old).store(&mut self.depth[to.clone()]);
+        self.id[to].copy_from_slice(&wins.pick_bits(Mask8([id; BLOCK]), old_ids).0);
     }
 
     /// Draws a triangle with holes; `is_solid` tells for a place of the picture, asked only where it would win.
@@ -331,7 +415,7 @@ impl TileBuffer {
         area: &TileArea,
         mut is_solid: impl FnMut(f64, f64) -> bool,
     ) {
-        for_each_span(record, area, |span| {
+        for span in Spans::of(record, area).iter() {
             let row = record.depth_of_row(span.y);
             for i in 0..span.length {
                 let new = record.hold(row + record.depth_of_column(span.x + i as i32));
@@ -341,6 +425,6 @@ impl TileBuffer {
                     (*depth, *id) = (new, record.id);
                 }
             }
-        });
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Random, camera, draw, scene_of, triangle};
 use crate::setup::{DepthPlane, Record, ScreenPoint, Sides};
-use crate::tile::{TILE_WIDTH, TileGrid, for_each_span};
+use crate::tile::{Spans, TILE_WIDTH, TileGrid};
 use glam::Vec3;
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::scene::{Mesh, Shape};
@@ -20,14 +20,14 @@ fn count(width: u32, height: u32, triangles: &[[Corner; 3]]) -> Vec<u32> {
         };
         grid.for_each_touched(&record, |tile| {
             let area = grid.area(tile);
-            for_each_span(&record, &area, |span| {
+            for span in Spans::of(&record, &area).iter() {
                 for i in 0..span.length as i32 {
                     let inside =
                         (span.x + i - area.x) as usize + (span.y - area.y) as usize * TILE_WIDTH as usize;
                     assert_eq!(inside, span.first + i as usize);
                     hits[(span.y * width as i32 + span.x + i) as usize] += 1;
                 }
-            });
+            }
         });
     }
     hits
