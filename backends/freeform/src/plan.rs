@@ -19,8 +19,8 @@ mod nanoseconds {
     pub(super) const PLANE: f64 = 20.0;
     /// A ray against a height field, for each doubling of its columns.
     pub(super) const HEIGHTS: f64 = 80.0;
-    /// A ray through a grid of distances, for each sample on its way.
-    pub(super) const FIELD: f64 = 13.0;
+    /// A ray into a grid of distances, for each sample along its longest edge.
+    pub(super) const FIELD: f64 = 9.0;
     /// A sample of a volume, with what it takes to light it.
     pub(super) const SAMPLE: f64 = 45.0;
     /// A surface.
@@ -73,7 +73,11 @@ fn plan_object(
         (Some(why), _) => (Decision::Skipped { why: why.to_owned() }, String::new(), 0),
         (None, Shape::Mesh(_) | Shape::Voxels(_)) => {
             let forecast = converter.distance_forecast(scene, object, detail);
-            let (size, samples) = (object.shape.bounds().size(), forecast.bytes as f64 / 5.0);
+            let size = match &*object.shape {
+                Shape::Voxels(voxels) => voxels.filled_bounds().size(),
+                shape => shape.bounds().size(),
+            };
+            let samples = forecast.bytes as f64 / 5.0;
             *edge =
                 (samples * (size.max_element() / size.element_product().cbrt()).powi(3)).cbrt().min(512.0);
             let decision = converted(object, forecast.bound, "drawn as the zero level of signed distances");
@@ -96,11 +100,7 @@ fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, volume_step: f64, e
         Shape::Primitive(body) => FORM + FUNCTION * body.faces().len().max(1) as f64,
         Shape::FreeForm(form) => FORM + FUNCTION * form.form().node_count() as f64,
         Shape::HeightField(field) => HEIGHTS * f64::from(field.columns().max(2)).log2(),
-        // Over so much of its longest edge a ray passes through the box.
-        Shape::Mesh(_) | Shape::Voxels(_) => {
-            let longest = object.bounds().size().max_element().max(1e-300);
-            FIELD * edges[index] * (survey.length[index] / longest).min(2.0)
-        }
+        Shape::Mesh(_) | Shape::Voxels(_) => FIELD * edges[index],
         Shape::Volume(_) => 0.0,
     };
     let volume_of = |index: usize, object: &Object| SAMPLE * survey.samples(index, object, volume_step);

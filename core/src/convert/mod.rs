@@ -15,7 +15,6 @@ mod primitive_mesh;
 mod voxel_mesh;
 mod voxelize;
 
-use crate::math::Aabb;
 use crate::parallel::Threads;
 use crate::scene::{Material, Mesh, Object, Scene, Shape, Voxels};
 use cache::Cache;
@@ -333,7 +332,7 @@ impl Converter {
         let tolerance = detail.in_object(object);
         // The grid lies around the triangles that it is made of: cells that are empty have none.
         let bounds = match &*object.shape {
-            Shape::Voxels(voxels) => filled_bounds(voxels),
+            Shape::Voxels(voxels) => voxels.filled_bounds(),
             shape => shape.bounds(),
         };
         let (size, step) = distance::grid_size(&bounds, tolerance, detail.max_resolution);
@@ -361,16 +360,6 @@ fn scale_of(object: &Object) -> f64 {
 fn extent_of(object: &Object) -> f64 {
     let size = object.shape.bounds().radius();
     if size > 0.0 && size.is_finite() { size } else { 1.0 }
-}
-
-/// Returns the box around the cells that hold something.
-fn filled_bounds(voxels: &Voxels) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    voxels.for_each_filled(|cell, _| {
-        let low = DVec3::from_array(cell.map(f64::from));
-        bounds = bounds.with(low).with(low + 1.0);
-    });
-    bounds
 }
 
 /// Tells for each palette byte whether light passes through.

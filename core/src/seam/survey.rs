@@ -99,19 +99,26 @@ impl Survey {
 /// What it takes to pass by a sample in empty space, against one that is seen.
 const EMPTY: f64 = 0.15;
 
-/// Returns the share of a volume's samples that are seen, from some of them.
+/// Edge of the blocks of samples that are passed by where all of them are empty.
+const BLOCK: usize = 8;
+
+/// Returns the share of a volume's blocks in which something is seen, from some of them.
 fn occupied(volume: &Volume) -> f64 {
-    /// Most samples that are looked at.
-    const MOST: usize = 1 << 16;
-    let all = volume.samples().len();
+    /// Most blocks that are looked at.
+    const MOST: usize = 2048;
+    let size = volume.size().map(|s| s as usize);
+    let blocks = size.map(|s| s.div_ceil(BLOCK));
+    let all: usize = blocks.iter().product();
+    let is_seen = |i: usize| volume.transfer.at(volume.samples().get(i)).1 > 0.0;
+    let holds = |block: usize| {
+        let at = [block % blocks[0], block / blocks[0] % blocks[1], block / (blocks[0] * blocks[1])];
+        let span = |a: usize| at[a] * BLOCK..((at[a] + 1) * BLOCK).min(size[a]);
+        span(2).any(|z| span(1).any(|y| span(0).any(|x| is_seen((z * size[1] + y) * size[0] + x))))
+    };
     // An odd stride does not stay in one column.
-    let stride = (all / MOST) | 1;
-    let (mut seen, mut looked) = (0u32, 0u32);
-    for i in (0..all).step_by(stride) {
-        looked += 1;
-        seen += u32::from(volume.transfer.at(volume.samples().get(i)).1 > 0.0);
-    }
-    f64::from(seen) / f64::from(looked.max(1))
+    let looked = (0..all).step_by((all / MOST) | 1);
+    let count = looked.len().max(1) as f64;
+    looked.filter(|&block| holds(block)).count() as f64 / count
 }
 
 /// Returns the box of an object that is drawn, and the share of rays into it that meet its surface.
@@ -127,7 +134,12 @@ fn bounds_and_fill(object: &Object) -> Option<(Aabb, f64)> {
         // Light passes through it.
         Shape::Volume(_) => 0.0,
     };
-    Some((object.bounds(), fill))
+    let bounds = match &*object.shape {
+        // A grid may be larger than what is in it.
+        Shape::Voxels(voxels) => voxels.filled_bounds().transformed(&object.world_from_object),
+        _ => object.bounds(),
+    };
+    Some((bounds, fill))
 }
 
 #[cfg(test)]
