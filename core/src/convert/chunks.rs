@@ -4,6 +4,7 @@ use super::primitive_mesh;
 use super::voxelize::{Grid, triangle_touches_box};
 use crate::math::Aabb;
 use crate::scene::{CHUNK, Form, FreeForm, HeightField, Mesh, Object, Scene, Shape, Volume};
+use glam::DVec3;
 
 /// Counts the chunks that a shape takes in a grid, those that are full of one value but once: they are shared.
 pub(super) fn taken(scene: &Scene, object: &Object, grid: &Grid) -> u64 {
@@ -97,12 +98,21 @@ impl<'a> Chunks<'a> {
         }
     }
 
-    /// Between samples a value is one between theirs.
+    /// Between samples a value is one between theirs: where none around reaches the level, none does; where one does, the
+    /// cell that is nearest to it tells.
     fn take_samples(&mut self, volume: &Volume) {
         let level = volume.transfer.surface_value();
         let size = volume.size().map(|s| s as usize);
+        let (first, half) = (volume.bounds().min, DVec3::splat(self.grid.cell * 0.5));
         for index in 0..self.taken.len() {
-            let space = self.space(self.cells(index));
+            let [begin, end] = self.cells(index);
+            let space = self.space([begin, end]);
+            let is_filled = |sample: [usize; 3]| {
+                let place = DVec3::from_array(sample.map(|c| c as f64 + 0.5));
+                let near = self.grid.clamp_cell(first + place * volume.spacing());
+                let cell = std::array::from_fn(|a| near[a].clamp(begin[a], end[a] - 1));
+                volume.value(self.grid.corner(cell) + half) >= f64::from(level)
+            };
             let is_outside = |form: &FreeForm| form.form().interval(&space).hi < 0.0;
             if volume.shell.as_ref().is_some_and(is_outside) {
                 continue;
@@ -114,7 +124,7 @@ impl<'a> Chunks<'a> {
             self.taken[index] = (from[2]..=to[2]).any(|z| {
                 (from[1]..=to[1]).any(|y| {
                     let row = (z * size[1] + y) * size[0];
-                    (from[0]..=to[0]).any(|x| volume.samples().get(row + x) >= level)
+                    (from[0]..=to[0]).any(|x| volume.samples().get(row + x) >= level && is_filled([x, y, z]))
                 })
             });
         }
@@ -167,7 +177,7 @@ mod tests {
     use super::*;
     use crate::parallel::OneThread;
     use crate::scene::{Chunk, Primitive, Samples, TransferFunction, TransferPoint};
-    use glam::{DVec2, DVec3, Vec3};
+    use glam::{DVec2, Vec3};
 
     /// Counts the chunks that are really taken.
     fn found(scene: &Scene, object: &Object, resolution: u32) -> u64 {
