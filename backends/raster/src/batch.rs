@@ -206,10 +206,9 @@ impl<'a> Batch<'a> {
             let face = Face::new(scene, model, lens, self.names.id[i]);
             let met = face.meet(lens, self.x.0[i], self.y.0[i]);
             self.t.0[i] = met.t;
-            for k in 0..2 {
-                weights[k].0[i] = met.weights[k + 1];
-                self.weights[k].0[i] = met.weights[k + 1] as f32;
-            }
+            let [_, v, w] = met.weights;
+            (weights[0].0[i], weights[1].0[i]) = (v, w);
+            (self.weights[0].0[i], self.weights[1].0[i]) = (v as f32, w as f32);
             if let Some(place) = met.held {
                 (held[i], any_held) = (place, true);
             }

@@ -88,9 +88,9 @@ impl Octet {
                     Vec3x8::splat(matrix.y_axis),
                     Vec3x8::splat(matrix.z_axis),
                 );
-                for k in 0..3 {
-                    let turned = x.scaled(normals[k].x) + y.scaled(normals[k].y) + z.scaled(normals[k].z);
-                    octet.normals[k] = Vec3x8::pick(of_part, turned, octet.normals[k]);
+                for (all, normal) in octet.normals.iter_mut().zip(normals) {
+                    let turned = x.scaled(normal.x) + y.scaled(normal.y) + z.scaled(normal.z);
+                    *all = Vec3x8::pick(of_part, turned, *all);
                 }
             }
             if part.mirrored {

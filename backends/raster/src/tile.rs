@@ -346,17 +346,19 @@ impl TileBuffer {
     fn draw_spans(&mut self, record: &Record, area: &TileArea, pixels: &Pixels, apart: usize) {
         let mut columns = [F64x8::ZERO; BLOCKS];
         let block = |x: i32| (x - area.x) as usize / BLOCK;
-        for block in block(pixels.x0)..=block(pixels.x1) {
-            columns[block] = record.depth_of_columns(area.x + (block * BLOCK) as i32);
+        let first = block(pixels.x0);
+        for (i, columns) in columns[first..=block(pixels.x1)].iter_mut().enumerate() {
+            *columns = record.depth_of_columns(area.x + ((first + i) * BLOCK) as i32);
         }
         for span in Spans::of(record, area).iter() {
             let row = F64x8::splat(record.depth_of_row(span.y));
             let begin = span.first % TILE_WIDTH as usize;
             let (line, end) = (span.first - begin, begin + span.length);
-            for block in begin / BLOCK..end.div_ceil(BLOCK) {
-                let first = block * BLOCK;
+            let blocks = begin / BLOCK..end.div_ceil(BLOCK);
+            for (i, columns) in columns[blocks.clone()].iter().enumerate() {
+                let first = (blocks.start + i) * BLOCK;
                 let at = line + first;
-                let depth = record.hold_all(row + columns[block]);
+                let depth = record.hold_all(row + *columns);
                 let mut outside = Mask8::NONE;
                 if first < begin || first + BLOCK > end {
                     let past = I32x8::count_from(first as i32) - I32x8::splat(begin as i32);
