@@ -17,6 +17,8 @@ use polyptych_core::shade::{fogged, highlight};
 pub(crate) const ROWS: u32 = 32;
 /// Columns whose background is filled at once.
 const GROUND: usize = 64;
+/// Columns over which its color changes evenly.
+const EVEN: usize = 16;
 
 /// How an object takes paint: what is the same for all its pixels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -297,7 +299,18 @@ impl Painting<'_> {
         } else if paper.is_shown {
             self.grain.paper(paper, x, y, colors);
         } else if let Some(directions) = directions {
-            directions.fill(&self.scene.environment.background, x, colors);
+            // Between places so near the background's color changes evenly.
+            let gradient = self.scene.environment.background.gradient();
+            let color_at = |column: u32| gradient.color(directions.at(column).y);
+            let mut begin = color_at(x);
+            for (piece, colors) in (1..).zip(colors.chunks_mut(EVEN)) {
+                let end = color_at(x + piece * EVEN as u32);
+                let step = (end - begin) * (1.0 / EVEN as f32);
+                for (i, color) in colors.iter_mut().enumerate() {
+                    *color = begin + step * i as f32;
+                }
+                begin = end;
+            }
         } else {
             for (x, color) in (x..).zip(colors) {
                 let ray = self.view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
@@ -343,11 +356,8 @@ impl Painting<'_> {
         let cosine = F32x8::load(&facing[at..]);
         let slope = if style.tone.steps > 1 {
             // On the smooth side: next to another surface or a shadow the other difference says nothing.
-            let steepness = |before: usize, after: usize| {
-                let (before, after) = (F32x8::load(&facing[before..]), F32x8::load(&facing[after..]));
-                (cosine - before).abs().min((after - cosine).abs())
-            };
-            let (across, down) = (steepness(at - 1, at + 1), steepness(at - stride, at + stride));
+            let across = steepness(cosine, facing, at - 1, at + 1);
+            let down = steepness(cosine, facing, at - stride, at + stride);
             (across * across + down * down).sqrt()
         } else {
             F32x8::ZERO
@@ -611,6 +621,13 @@ impl Run<'_> {
             ink.0[lane] = covered.0[lane];
         }
     }
+}
+
+/// Returns by how much numbers change to the row before or after, whichever is less.
+#[inline(always)]
+fn steepness(here: F32x8, all: &[f32], before: usize, after: usize) -> F32x8 {
+    let (before, after) = (F32x8::load(&all[before..]), F32x8::load(&all[after..]));
+    (here - before).abs().min((after - here).abs())
 }
 
 #[inline(always)]
