@@ -104,8 +104,11 @@ impl Hatching {
         let float = |name: &str| settings.float(declared, name) as f32;
         let names = if set == Set::Images { settings.text(declared, "hatch.images") } else { "" };
         let files: Vec<&str> = names.split(',').map(str::trim).filter(|f| !f.is_empty()).collect();
-        if set == Set::Images && (files.is_empty() || files.len() > 64) {
-            return Err(HatchError(format!("hatch.images: name 1 to 64 pictures, not {}", files.len())));
+        if set == Set::Images && files.is_empty() {
+            return Ok(None);
+        }
+        if files.len() > 64 {
+            return Err(HatchError(format!("hatch.images: name at most 64 pictures, not {}", files.len())));
         }
         let count = match set {
             Set::Pencil | Set::Ink => 4,
