@@ -3,8 +3,9 @@
 //!
 //! `cargo run --release --example plan_accuracy [SCENE...]`: files, or names of built-in scenes; all of these without any.
 
+use polyptych::framebuffer::Framebuffer;
 use polyptych::load::{LoadOptions, load};
-use polyptych::pace::Pace;
+use polyptych::pace::{Pace, frame_ms};
 use polyptych::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
@@ -38,14 +39,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for backend in BACKENDS {
             let mut studio = Studio::new(Registry::builtin(), 1)?;
             let plan = studio.renderer(backend)?.plan(&scene, &need);
-            let drawing = studio.draw(backend, &scene, &need)?;
-            let mut picture = drawing.framebuffer;
-            let mut times = vec![drawing.frame_ms];
+            let (prepared, _) = studio.prepare(backend, &scene, &need)?;
+            let mut picture = Framebuffer::new(need.width, need.height, need.channels);
+            let mut times = vec![frame_ms(&mut studio, backend, &need, &mut picture)?];
             while times.len() < 5 && times.iter().sum::<f64>() < 4000.0 {
-                times.push(studio.render(backend, &need.frame(), &mut picture)?.1);
+                times.push(frame_ms(&mut studio, backend, &need, &mut picture)?);
             }
             times.sort_by(f64::total_cmp);
-            let (ms, held) = (times[(times.len() - 1) / 2], drawing.prepared.bytes.max(1));
+            let (ms, held) = (times[(times.len() - 1) / 2], prepared.bytes.max(1));
             let planned_ms = plan.estimated_ms * pace.factor(backend);
             let (bytes, time) = (plan.bytes.max(1) as f64 / held as f64, planned_ms / ms);
             all += 1;

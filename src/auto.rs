@@ -3,15 +3,19 @@
 //! Plans say what each would build; how fast and how right it is they cannot know, for that depends on the scene. So each
 //! candidate draws two small pictures of it first: their times tell what a pixel costs and what the rest does, their
 //! difference to the reference's how right it is. What is converted for them has the tolerance of the large picture, so
-//! that it is found in the cache when that is drawn. Where even that takes next to no time, it is drawn and timed itself.
+//! that it is found in the cache when that is drawn. Where even that takes next to no time, or comes near to what is
+//! asked, it is drawn and measured itself. Those between which it is close then draw by turns: what else the machine does
+//! slows all of them.
+
+mod pilot;
 
 use crate::compare::REFERENCE;
-use crate::framebuffer::{Channels, Framebuffer};
-use crate::metrics::color_rmse;
+use crate::framebuffer::Channels;
 use crate::parallel::Threads as _;
 use crate::scene::Scene;
 use crate::seam::{Need, Plan};
 use crate::studio::{Studio, StudioError};
+use pilot::{Rulers, pilot};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -72,21 +76,14 @@ pub struct Outcome {
 /// Tolerances that are tried, in pixels.
 const TOLERANCES: [f64; 3] = [2.0, 0.5, 0.125];
 
-/// The pilot pictures' sizes, as divisors of the picture's edges.
-const DIVISORS: [u32; 2] = [6, 3];
-
-/// A pilot picture has at least so many columns: smaller ones are all edges.
-const LEAST: u32 = 48;
-
 /// Candidates whose plan names more bytes are not tried.
 const MOST_BYTES: u64 = 4 << 30;
 
 /// Share of a goal that a prediction must keep to, since it may be off by as much.
 const MARGIN: f64 = 0.9;
 
-/// Frames of a pilot after the first, and the time of one from which on there are none, milliseconds.
-const FRAMES: usize = 4;
-const SLOW_MS: f64 = 150.0;
+/// The same of a time: those near a goal are measured.
+const TIME_MARGIN: f64 = 0.95;
 
 /// A picture that is expected in so many milliseconds is drawn in full: its time is then known and not expected.
 const FULL_MS: f64 = 40.0;
@@ -96,6 +93,16 @@ pub const UNSEEN: f64 = 0.25 / 255.0;
 
 /// A pilot that takes so long, milliseconds, is the last of its back end: finer ones take longer still.
 const PATIENCE_MS: f64 = 3000.0;
+
+/// What pilots foretell may be off by this factor: nearer to what is asked it may lie on the other side.
+const NEAR: f64 = 2.0;
+
+/// Measured times that differ by less than this factor may be the other way round without other programs.
+const CLOSE: f64 = 1.5;
+
+/// How often candidates between which it is close take their turn, and how long a frame of theirs may be, milliseconds.
+const TURNS: usize = 4;
+const TURN_MS: f64 = 150.0;
 
 /// Chooses among back ends for a need; those that are not photometric show something else and are left out.
 ///
@@ -108,12 +115,7 @@ pub fn choose(
     backends: &[String],
     goal: Goal,
 ) -> Result<Choice, StudioError> {
-    let sizes = DIVISORS.map(|d| {
-        let divisor = d.min(need.width / LEAST).max(1);
-        [need.width.div_ceil(divisor).max(1), need.height.div_ceil(divisor).max(1)]
-    });
-    let rulers =
-        [pilot(studio, REFERENCE, scene, need, sizes[0])?, pilot(studio, REFERENCE, scene, need, sizes[1])?];
+    let rulers = Rulers::draw(studio, scene, need)?;
     let mut considered = Vec::new();
     for backend in backends {
         if !studio.registry().info(backend)?.photometric {
@@ -123,48 +125,111 @@ pub fn choose(
         for tolerance_px in TOLERANCES {
             let need = Need { tolerance_px, ..need.clone() };
             let plan = studio.renderer(backend)?.plan(scene, &need);
-            let planned_bytes = plan.bytes;
             // What is drawn as given is the same at any tolerance.
-            if planned_bytes > MOST_BYTES || plans.contains(&plan) {
+            if plan.bytes > MOST_BYTES || plans.contains(&plan) {
                 continue;
             }
+            let (candidate, pilot_ms) = measured(studio, scene, &need, backend, &plan, &rulers, goal)?;
+            considered.push(candidate);
             plans.push(plan);
-            let mut drawn = Vec::new();
-            for size in sizes {
-                drawn.push(pilot(studio, backend, scene, &need, size)?);
-            }
-            let mut predicted_ms = extrapolated(sizes, [drawn[0].ms, drawn[1].ms], need.width, need.height);
-            // Near a budget it matters on which side of it the time lies.
-            let is_close = matches!(goal, Goal::BudgetMs(ms) if (0.5..2.0).contains(&(predicted_ms / ms)));
-            if predicted_ms < FULL_MS || (is_close && predicted_ms < PATIENCE_MS) {
-                predicted_ms = pilot(studio, backend, scene, &need, [need.width, need.height])?.ms;
-            }
-            let error = |i: usize| color_rmse(&drawn[i].picture, &rulers[i].picture).unwrap_or(0.0);
-            let mut predicted_error = finer(error(0), error(1));
-            if plans.last().is_some_and(|p| p.objects.iter().any(|o| o.decision.bound() != Some(0.0))) {
-                // What is off by a share of a pixel is off by a smaller one of a pilot's: as coarse in its own pixels a
-                // pilot shows it at edges, of which a larger picture has fewer.
-                let share = f64::from(sizes[1][0]) / f64::from(need.width.max(1));
-                let coarse = Need { tolerance_px: tolerance_px / share, ..need.clone() };
-                let picture = pilot(studio, backend, scene, &coarse, sizes[1])?.picture;
-                let own = color_rmse(&picture, &rulers[1].picture).unwrap_or(0.0) * share.sqrt();
-                predicted_error = predicted_error.max(own);
-            }
-            considered.push(Candidate {
-                backend: backend.clone(),
-                tolerance_px,
-                predicted_ms,
-                predicted_error,
-                planned_bytes,
-            });
-            if drawn[1].prepare_ms + drawn[1].ms > PATIENCE_MS || backend == REFERENCE {
+            if pilot_ms > PATIENCE_MS || backend == REFERENCE {
                 break;
             }
         }
     }
+    take_turns(studio, scene, need, &mut considered, goal)?;
     let (chosen, meets_goal) = best(&considered, goal)
         .ok_or_else(|| StudioError::Threads("no back end that could be chosen can draw this".to_owned()))?;
     Ok(Choice { goal, chosen, meets_goal, considered })
+}
+
+/// Draws the pilots of a candidate, and the whole picture where that is quick or comes near to what is asked. Returns what
+/// is to be expected of it, and the milliseconds that the larger pilot took.
+fn measured(
+    studio: &mut Studio,
+    scene: &Arc<Scene>,
+    need: &Need,
+    backend: &str,
+    plan: &Plan,
+    rulers: &Rulers,
+    goal: Goal,
+) -> Result<(Candidate, f64), StudioError> {
+    let mut drawn = Vec::new();
+    for size in rulers.sizes {
+        drawn.push(pilot(studio, backend, scene, need, size)?);
+    }
+    let mut predicted_ms = rulers.extrapolated([drawn[0].ms, drawn[1].ms], need);
+    let mut predicted_error = rulers.finer([&drawn[0].picture, &drawn[1].picture]);
+    let is_exact = plan.objects.iter().all(|o| o.decision.bound() == Some(0.0));
+    let at_edges = if is_exact { 0.0 } else { rulers.coarse(studio, backend, scene, need)? };
+    let near = |value: f64, asked: f64| (asked / NEAR..asked * NEAR).contains(&value);
+    let is_close = match goal {
+        Goal::BudgetMs(ms) => near(predicted_ms, ms),
+        Goal::MaxError(error) => near(predicted_error.max(at_edges), error),
+    };
+    if predicted_ms < FULL_MS || (is_close && predicted_ms < PATIENCE_MS) {
+        let full = pilot(studio, backend, scene, need, [need.width, need.height])?;
+        predicted_ms = full.ms;
+        // The whole picture shows its error itself, wherever the larger pilot's rays are among its own.
+        predicted_error = rulers.sampled(&full.picture, need).unwrap_or(predicted_error);
+    }
+    let candidate = Candidate {
+        backend: backend.to_owned(),
+        tolerance_px: need.tolerance_px,
+        predicted_ms,
+        // Errors in few places may lie between those pixels.
+        predicted_error: predicted_error.max(at_edges),
+        planned_bytes: plan.bytes,
+    };
+    Ok((candidate, drawn[1].prepare_ms + drawn[1].ms))
+}
+
+/// Lets candidates between whose times it is close draw by turns, and keeps the shortest time of each.
+fn take_turns(
+    studio: &mut Studio,
+    scene: &Arc<Scene>,
+    need: &Need,
+    all: &mut [Candidate],
+    goal: Goal,
+) -> Result<(), StudioError> {
+    let rivals = rivals(all, goal);
+    if rivals.len() < 2 {
+        return Ok(());
+    }
+    let mut shortest = vec![f64::INFINITY; rivals.len()];
+    for _ in 0..TURNS {
+        for (&rival, shortest) in rivals.iter().zip(&mut shortest) {
+            let Candidate { backend, tolerance_px, .. } = &all[rival];
+            let need = Need { tolerance_px: *tolerance_px, channels: Channels::COLOR, ..need.clone() };
+            let drawing = studio.draw(backend, scene, &need)?;
+            let mut picture = drawing.framebuffer;
+            let again = studio.render(backend, &need.frame(), &mut picture)?.1;
+            *shortest = shortest.min(drawing.frame_ms).min(again);
+        }
+    }
+    for (rival, shortest) in rivals.into_iter().zip(shortest) {
+        all[rival].predicted_ms = shortest;
+    }
+    Ok(())
+}
+
+/// Lists the candidates of which any may turn out to be the one to take when times are known better.
+fn rivals(all: &[Candidate], goal: Goal) -> Vec<usize> {
+    let Some((best, _)) = best(all, goal) else { return Vec::new() };
+    let is_rival = |c: &&Candidate| match goal {
+        Goal::MaxError(error) => c.predicted_error <= error * MARGIN,
+        // One that seems too slow is none unless it would be more right.
+        Goal::BudgetMs(ms) => {
+            let seen = |c: &Candidate| c.predicted_error.max(UNSEEN);
+            seen(c) <= seen(&best) && c.predicted_ms <= ms * NEAR
+        }
+    };
+    let is_equal = |c: &&Candidate| match goal {
+        Goal::MaxError(_) => c.predicted_ms <= best.predicted_ms * CLOSE,
+        Goal::BudgetMs(_) => true,
+    };
+    let near = all.iter().enumerate().filter(|(_, c)| is_rival(c) && is_equal(c) && c.predicted_ms < TURN_MS);
+    near.map(|(index, _)| index).collect()
 }
 
 /// Times what was chosen at full size; `error` is that of its picture.
@@ -194,53 +259,6 @@ pub fn verify(
     Ok(Outcome { choice, ms, error, kept })
 }
 
-struct Pilot {
-    picture: Framebuffer,
-    ms: f64,
-    prepare_ms: f64,
-}
-
-/// Draws a small picture some times; the fastest counts, so that scratch memory and other programs do not.
-fn pilot(
-    studio: &mut Studio,
-    backend: &str,
-    scene: &Arc<Scene>,
-    need: &Need,
-    [width, height]: [u32; 2],
-) -> Result<Pilot, StudioError> {
-    // In world space the tolerance is that of the large picture.
-    let tolerance_px = need.tolerance_px * f64::from(width) / f64::from(need.width.max(1));
-    let small = Need { width, height, tolerance_px, channels: Channels::COLOR, ..need.clone() };
-    let drawing = studio.draw(backend, scene, &small)?;
-    let mut picture = drawing.framebuffer;
-    let mut ms = drawing.frame_ms;
-    for _ in 0..FRAMES {
-        if ms > SLOW_MS {
-            break;
-        }
-        ms = ms.min(studio.render(backend, &small.frame(), &mut picture)?.1);
-    }
-    Ok(Pilot { picture, ms, prepare_ms: drawing.prepare_ms })
-}
-
-/// Lays a line through the times of two sizes: what a pixel costs, and what does not depend on pixels.
-fn extrapolated(sizes: [[u32; 2]; 2], ms: [f64; 2], width: u32, height: u32) -> f64 {
-    let count = |[w, h]: [u32; 2]| f64::from(w) * f64::from(h);
-    let (small, large, full) = (count(sizes[0]), count(sizes[1]), count([width, height]));
-    if large <= small {
-        return ms[1] * full / large.max(1.0);
-    }
-    // Noise must not make pixels cost less than nothing, nor the rest.
-    let slope = ((ms[1] - ms[0]) / (large - small)).clamp(0.0, ms[1] / large);
-    ms[1] + slope * (full - large)
-}
-
-/// Expects an error to fall from the larger pilot to the picture as it fell from the smaller one, at most by half: edges
-/// take a smaller share of a larger picture.
-fn finer(small: f64, large: f64) -> f64 {
-    if small > 0.0 { large * (large / small).clamp(0.5, 1.0) } else { large }
-}
-
 /// Returns the best candidate for a goal and whether it meets it.
 fn best(all: &[Candidate], goal: Goal) -> Option<(Candidate, bool)> {
     let by_time = |a: &&Candidate, b: &&Candidate| a.predicted_ms.total_cmp(&b.predicted_ms);
@@ -250,7 +268,7 @@ fn best(all: &[Candidate], goal: Goal) -> Option<(Candidate, bool)> {
     };
     let met = match goal {
         Goal::MaxError(error) => all.iter().filter(|c| c.predicted_error <= error * MARGIN).min_by(by_time),
-        Goal::BudgetMs(ms) => all.iter().filter(|c| c.predicted_ms <= ms * MARGIN).min_by(by_error),
+        Goal::BudgetMs(ms) => all.iter().filter(|c| c.predicted_ms <= ms * TIME_MARGIN).min_by(by_error),
     };
     if let Some(candidate) = met {
         return Some((candidate.clone(), true));
@@ -304,7 +322,7 @@ mod tests {
         assert_eq!(chosen(Goal::MaxError(0.02)), ("freeform".to_owned(), true));
         assert_eq!(chosen(Goal::MaxError(0.001)), ("reference".to_owned(), true));
         assert_eq!(chosen(Goal::BudgetMs(30.0)), ("freeform".to_owned(), true));
-        assert_eq!(chosen(Goal::BudgetMs(22.0)), ("raster".to_owned(), true), "20 ms may become 23");
+        assert_eq!(chosen(Goal::BudgetMs(20.5)), ("raster".to_owned(), true), "20 ms may become 21");
         assert_eq!(chosen(Goal::BudgetMs(1.0)), ("raster".to_owned(), false));
         let alike = [candidate("raster", 2.0, 0.0003), candidate("reference", 300.0, 0.0)];
         let (chosen, _) = best(&alike, Goal::BudgetMs(1000.0)).unwrap();
@@ -313,14 +331,17 @@ mod tests {
     }
 
     #[test]
-    fn time_is_what_pixels_cost_and_what_they_do_not() {
-        let sizes = [[100, 100], [200, 100]];
-        assert!((extrapolated(sizes, [3.0, 5.0], 300, 100) - 7.0).abs() < 1e-12);
-        assert!((extrapolated(sizes, [5.0, 5.0], 300, 100) - 5.0).abs() < 1e-12, "all is fixed");
-        assert!((extrapolated(sizes, [0.0, 4.0], 400, 100) - 8.0).abs() < 1e-12, "all is pixels");
-        assert_eq!(
-            [finer(0.0, 0.1), finer(0.4, 0.2), finer(0.4, 0.1), finer(0.1, 0.2)],
-            [0.1, 0.1, 0.05, 0.2]
-        );
+    fn those_between_which_it_is_close_are_rivals() {
+        let all = [
+            candidate("raster", 2.0, 0.03),
+            candidate("voxel", 2.8, 0.03),
+            candidate("freeform", 20.0, 0.01),
+            candidate("reference", 300.0, 0.0),
+        ];
+        assert_eq!(rivals(&all, Goal::MaxError(0.05)), [0, 1], "a third is nearly as fast");
+        assert_eq!(rivals(&all, Goal::MaxError(0.02)), [2]);
+        assert_eq!(rivals(&all, Goal::BudgetMs(16.0)), [0, 1, 2], "20 ms may become 15");
+        assert_eq!(rivals(&all, Goal::BudgetMs(9.0)), [0, 1], "20 ms do not become 8");
+        assert!(rivals(&[], Goal::BudgetMs(1.0)).is_empty());
     }
 }

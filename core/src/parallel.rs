@@ -79,6 +79,13 @@ impl Pool {
         Ok(Self { is_pinned: pinned.iter().all(|&p| p), pool: Arc::new(pool) })
     }
 
+    /// Returns the milliseconds that the threads have worked so far, those not counted in which other programs had their
+    /// cores; nothing where the system does not tell.
+    #[must_use]
+    pub fn worked_ms(&self) -> Option<f64> {
+        self.pool.broadcast(|_| cores::worked_ms()).into_iter().sum()
+    }
+
     /// Runs `work` inside the pool, so that rayon's own parallel iterators use these threads too.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         self.pool.install(work)
@@ -102,6 +109,13 @@ mod cores {
         set.set(core);
         let _ = sched_setaffinity(None, &set);
     }
+
+    /// Returns the milliseconds that the calling thread has had a core.
+    #[expect(clippy::unnecessary_wraps, reason = "elsewhere it is not known")]
+    pub(super) fn worked_ms() -> Option<f64> {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        Some(time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6)
+    }
 }
 
 /// Elsewhere threads go where the system puts them.
@@ -112,6 +126,10 @@ mod cores {
     }
 
     pub(super) fn stay_on(_core: usize) {}
+
+    pub(super) fn worked_ms() -> Option<f64> {
+        None
+    }
 }
 
 impl Threads for Pool {

@@ -1,10 +1,9 @@
 //! What is counted in a case?
 
-use super::{draw, draw_measured, scenes::Setup};
+use super::{draw, draw_measured, scenes::Setup, steady};
 use crate::compare::REFERENCE;
 use crate::framebuffer::{Channel, Framebuffer};
 use crate::metrics::{Errors, color_rmse};
-use crate::parallel::Threads;
 use crate::seam::{Frame, Need};
 use crate::studio::{Studio, StudioError};
 
@@ -34,6 +33,16 @@ pub(super) enum Count {
     Change,
     /// Share of pixels that differ from a picture whose renderer never saw the scenes before.
     Edited,
+    /// The same after an edit in the middle of a frame, of that frame and the next.
+    EditedMidway,
+    /// Share of pixels that differ from the picture of one thread.
+    Threads,
+    /// Share of pixels at which a form is not met where counting roots says.
+    Roots,
+    /// Share of the reference's objects that are not seen.
+    Missing,
+    /// Share of the cells within a shell of voxels that water from outside reaches.
+    Flood,
     /// Pixels that change from frame to frame beyond the reference's own, as a share of those.
     Toggles,
     /// Pixels whose shadow comes or goes, in the same way.
@@ -92,7 +101,11 @@ impl Count {
                 return toggles(studio, trial, backend, &ruler, changes);
             }
             Self::Growth => return growth(studio, trial),
-            Self::Edited => return edited(studio, backend, own),
+            Self::Edited => return steady::edited(studio, backend, own),
+            Self::EditedMidway => return steady::edited_midway(studio, backend, own),
+            Self::Threads => return steady::threaded(studio, backend, own),
+            Self::Roots => return steady::roots_missed(studio, trial),
+            Self::Flood => return steady::flooded(studio, trial),
             _ => {}
         }
         let (picture, ms) = draw(studio, backend, own)?;
@@ -144,6 +157,7 @@ impl Count {
             }
             Self::Color => color_rmse(&picture, &reference).unwrap_or(0.0),
             Self::Albedo => albedo_error(&picture, &reference),
+            Self::Missing => steady::objects_missed(&picture, &reference),
             Self::Hole => {
                 let seen = picture.id().iter().zip(reference.id()).filter(|(_, b)| **b != 0);
                 let (holes, all) = seen.fold((0u32, 0u32), |(h, n), (a, _)| (h + u32::from(*a == 0), n + 1));
@@ -185,24 +199,6 @@ fn growth(studio: &mut Studio, trial: &Trial<'_>) -> Result<Drawn, StudioError> 
         exponents.fold(0.0, f64::max)
     });
     Ok(Drawn { error, ms, prepare_ms: now[1], picture: Some(picture), reference: None })
-}
-
-/// Draws scene after scene with one renderer, and the last one with another that knows nothing of those before.
-fn edited(studio: &mut Studio, backend: &str, own: &Setup) -> Result<Drawn, StudioError> {
-    for scene in &own.history {
-        draw(studio, backend, &Setup { scene: scene.clone(), ..own.clone() })?;
-    }
-    let (picture, ms) = draw(studio, backend, own)?;
-    let mut fresh = Studio::new(studio.registry().clone(), Threads::count(studio.pool()))?;
-    let reference = draw(&mut fresh, backend, own)?.0;
-    let pairs = picture
-        .color()
-        .iter()
-        .zip(reference.color())
-        .zip(picture.distance().iter().zip(reference.distance()));
-    let differs = pairs.filter(|((a, b), (d, e))| a != b || d.to_bits() != e.to_bits()).count();
-    let error = differs as f64 / picture.color().len().max(1) as f64;
-    Ok(Drawn { error, ms, prepare_ms: 0.0, picture: Some(picture), reference: Some(reference) })
 }
 
 /// Returns the 99th percentile of the albedo's largest difference, where both see the same object.

@@ -7,6 +7,8 @@
 mod cases;
 mod count;
 mod scenes;
+mod steady;
+mod sturm;
 
 pub use cases::cases;
 

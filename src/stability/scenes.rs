@@ -28,8 +28,10 @@ pub(super) struct Setup {
     pub(super) distance: f64,
     /// Whether a better way moved scene and camera: it is then held against the reference at its own place.
     pub(super) is_moved: bool,
-    /// How much there is of what grows.
+    /// How much there is of what grows: threads that draw, finished bands after which the scene is edited.
     pub(super) load: f64,
+    /// What is changed while a frame is drawn.
+    pub(super) edit: fn(&mut Scene),
 }
 
 pub(super) const WIDTH: u32 = 96;
@@ -49,6 +51,7 @@ pub(super) fn setup(scene: Scene, camera: Camera) -> Setup {
         distance,
         is_moved: false,
         load: 1.0,
+        edit: |_| (),
     }
 }
 

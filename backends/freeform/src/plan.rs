@@ -73,7 +73,11 @@ fn plan_object(
         (Some(why), _) => (Decision::Skipped { why: why.to_owned() }, String::new(), 0),
         (None, Shape::Mesh(_) | Shape::Voxels(_)) => {
             let forecast = converter.distance_forecast(scene, object, detail);
-            let (size, samples) = (object.shape.bounds().size(), forecast.bytes as f64 / 5.0);
+            let size = match &*object.shape {
+                Shape::Voxels(voxels) => voxels.filled_bounds().size(),
+                shape => shape.bounds().size(),
+            };
+            let samples = forecast.bytes as f64 / 5.0;
             *edge =
                 (samples * (size.max_element() / size.element_product().cbrt()).powi(3)).cbrt().min(512.0);
             let decision = converted(object, forecast.bound, "drawn as the zero level of signed distances");
@@ -99,14 +103,7 @@ fn milliseconds(scene: &Scene, need: &Need, demand: &Demand, volume_step: f64, e
         Shape::Mesh(_) | Shape::Voxels(_) => FIELD * edges[index],
         Shape::Volume(_) => 0.0,
     };
-    let volume_of = |index: usize, object: &Object| match &*object.shape {
-        Shape::Volume(volume) => {
-            let scale = object.world_from_object.matrix3.determinant().abs().cbrt();
-            let step = volume.spacing().min_element() * scale * volume_step;
-            SAMPLE * survey.length[index] / step.max(1e-300)
-        }
-        _ => 0.0,
-    };
+    let volume_of = |index: usize, object: &Object| SAMPLE * survey.samples(index, object, volume_step);
     let rays = survey.sum(scene, surface_of);
     // A shadow ray passes what a ray of the picture passes, where there is anything.
     let shadow = rays / survey.entered.max(1e-3);

@@ -212,7 +212,8 @@ impl Body {
                 continue;
             }
             let local = self.object_from_world.transform_point3(position.get(i));
-            let place = self.place(local, normal.get(i), material);
+            let direction = self.object_from_world.transform_vector3(rays.direction.get(i));
+            let place = self.place(local, direction, normal.get(i), material);
             let unit = place.normal.normalize_or_zero();
             // Without anyone to see the color, only holes and haze are worth a look at the texture.
             let (c, o) = if reads_color || self.see_through {
@@ -240,8 +241,14 @@ impl Body {
         points.hair = F64x8::pick(met, F64x8::splat(self.radius * 1e-5), points.hair);
     }
 
-    /// Finds normal, coordinates and material of a point in object space; `normal` is that of a form.
-    fn place<'a>(&'a self, local: DVec3, normal: DVec3, material: &'a Material) -> Place<'a> {
+    /// Finds normal, coordinates and material of a point in object space that a ray met; `normal` is that of a form.
+    fn place<'a>(
+        &'a self,
+        local: DVec3,
+        direction: DVec3,
+        normal: DVec3,
+        material: &'a Material,
+    ) -> Place<'a> {
         match (&*self.geometry, &*self.shape) {
             (Geometry::Form(_), Shape::Primitive(primitive)) => {
                 let uv = Some(primitive.uv(local, normal.normalize_or_zero()));
@@ -258,7 +265,7 @@ impl Body {
             (Geometry::Field(model), _) => {
                 let material =
                     model.palette.get(field::material(model, local)).unwrap_or(Material::fallback());
-                Place { normal: field::normal(model, local), uv: None, material }
+                Place { normal: field::normal(model, local, direction), uv: None, material }
             }
             _ => Place { normal, uv: None, material },
         }

@@ -232,7 +232,12 @@ impl<'a> Batch<'a> {
                         let place = Place { scene, model, lens, x: self.x.0[i], y: self.y.0[i] };
                         face.color(&place, &Met { t, weights, from_within: from_within.has(i), held })
                     }
-                    None => (material.base_color, material.effective_opacity(material.opacity).min(1.0)),
+                    None => {
+                        let (part, triangle) = (self.names.part[i] as usize, self.names.triangle[i] as usize);
+                        let weights = [self.weights[0].0[i], self.weights[1].0[i]];
+                        let color = model.parts[part].tinted(material.base_color, triangle, weights);
+                        (color, material.effective_opacity(material.opacity).min(1.0))
+                    }
                 };
                 self.opacity[i] = opacity;
                 self.color.set(i, color);

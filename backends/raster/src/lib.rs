@@ -66,5 +66,6 @@ mod strokes;
 mod tests;
 mod tile;
 mod transform;
+mod wide;
 
 pub use renderer::{Factory, Raster};

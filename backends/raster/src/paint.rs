@@ -128,7 +128,7 @@ impl<'a> Painter<'a> {
 
     fn paint_tile(&self, grid: &TileGrid, tile: usize, band: &mut Band<'_>, scratch: &mut Scratch) -> u64 {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if crate::wide::has_avx2() {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for a processor feature can only be called so"
@@ -285,13 +285,12 @@ impl<'a> Painter<'a> {
         faces.find(self.light.scene, self.light.model, self.lens, id)
     }
 
-    /// Adds a sample to a batch that is not full. A triangle whose color or light is found from more than its corners
-    /// and normals gets a face.
+    /// Adds a sample to a batch that is not full. A triangle whose texture or corners' light is to be found gets a face.
     #[inline(always)]
     pub(crate) fn add(&self, batch: &mut Batch<'a>, faces: &mut Faces, place: (f64, f64), id: u32, tag: u32) {
         let model = self.light.model;
         let part = model.part_near(batch.last_part(), id);
-        let is_painted = model.parts[part].is_painted && (self.ask == Ask::Color || tag & LAYER != 0);
+        let is_painted = model.parts[part].is_textured && (self.ask == Ask::Color || tag & LAYER != 0);
         let needs_face = is_painted || self.shading == Shading::Gouraud;
         let face = if needs_face { self.find(faces, id) } else { NO_FACE };
         batch.push(place, [id, part as u32, id - model.parts[part].first_triangle], face, tag);
@@ -300,7 +299,7 @@ impl<'a> Painter<'a> {
     /// Finds and lights the surfaces of a batch. This is where most time goes: one kernel, called from everywhere.
     pub(crate) fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if crate::wide::has_avx2() {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for a processor feature can only be called so"

@@ -301,7 +301,7 @@ impl TileBuffer {
     /// Draws solid triangles, listed by rising ids: of equal depths the lowest wins.
     pub(crate) fn of(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if crate::wide::has_avx2() {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for a processor feature can only be called so"

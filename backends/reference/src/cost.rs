@@ -44,13 +44,7 @@ pub(crate) fn milliseconds(
         Shape::HeightField(field) => HEIGHTS * f64::from(field.columns().max(2)).log2(),
         Shape::Volume(_) => 0.0,
     };
-    let volume_of = |index: usize, object: &Object| match &*object.shape {
-        Shape::Volume(volume) => {
-            let scale = object.world_from_object.matrix3.determinant().abs().cbrt();
-            SAMPLE * survey.length[index] / (volume.spacing().min_element() * scale * volume_step).max(1e-300)
-        }
-        _ => 0.0,
-    };
+    let volume_of = |index: usize, object: &Object| SAMPLE * survey.samples(index, object, volume_step);
     let rays = survey.sum(scene, surface_of);
     // A shadow ray passes what a ray of the picture passes, where there is anything.
     let shadow = rays / survey.entered.max(1e-3);

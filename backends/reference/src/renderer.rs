@@ -316,7 +316,11 @@ impl Painter<'_> {
         let geometry = [Channel::Distance, Channel::Normal, Channel::Id, Channel::Albedo, Channel::Shadow]
             .iter()
             .any(|&c| self.channels.has(c));
-        let center = Wants { color: color && samples <= 1, shadow: self.channels.has(Channel::Shadow) };
+        let center = Wants {
+            color: color && samples <= 1,
+            albedo: self.channels.has(Channel::Albedo),
+            shadow: self.channels.has(Channel::Shadow),
+        };
         let mut pixel = if geometry || samples <= 1 {
             self.sample(tracer, x, y, (0.5, 0.5), center)
         } else {
@@ -326,7 +330,8 @@ impl Painter<'_> {
             let (mut sum, mut hits) = (glam::DVec3::ZERO, 0u32);
             for sample in 0..samples {
                 let place = place_in_pixel(x, y, sample, samples);
-                let seen = self.sample(tracer, x, y, place, Wants { color, shadow: false });
+                let wants = Wants { color, albedo: false, shadow: false };
+                let seen = self.sample(tracer, x, y, place, wants);
                 sum += seen.color.as_dvec3();
                 hits += u32::from(seen.id != 0);
             }

@@ -204,11 +204,18 @@ impl World {
         (material, color * finish.color, opacity, finish.normal)
     }
 
-    /// Returns what shading needs of the surface that a ray met.
-    pub(crate) fn point(&self, ray: &Ray, start: Start, met: &Met<'_>) -> Point<'_> {
+    /// Returns what shading needs of the surface that a ray met. Without anyone to see its color no texture is read for
+    /// it: color and opacity are then the material's own.
+    pub(crate) fn point(&self, ray: &Ray, start: Start, met: &Met<'_>, reads_color: bool) -> Point<'_> {
         let item = met.item;
         let line = item.line(ray, start);
-        let (material, color, opacity, smooth) = self.look_up(item, &line, &met.hit);
+        let (material, color, opacity, smooth) = if reads_color {
+            self.look_up(item, &line, &met.hit)
+        } else {
+            let material = self.scene.material(&self.scene.objects[item.object], met.hit.slot);
+            let finish = item.geometry.finish(&met.hit, line.at(met.hit.t));
+            (material, material.base_color, material.opacity, finish.normal)
+        };
         let world = |n: DVec3| (item.world_from_normal * n).normalize_or(-ray.direction);
         let true_normal = world(met.hit.normal);
         let side = if true_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };

@@ -48,6 +48,7 @@ pub(super) fn of_mesh(
     let open = is_open(mesh);
     let inside = if open { vec![false; nearest.len()] } else { inside_votes(mesh, &grid, threads) };
     let band = step * DistanceModel::BAND;
+    let half_sheet = if open { step * 0.75 } else { 0.0 };
 
     let mut noted: Vec<Option<(ColorKey, Vec3)>> = vec![None; nearest.len()];
     let mut pairs: Vec<_> = nearest.iter_mut().zip(&mut noted).collect();
@@ -76,7 +77,7 @@ pub(super) fn of_mesh(
         .map(|(near, &inside)| {
             let distance = near.distance.min(band);
             let signed = if open {
-                step * 0.75 - distance
+                half_sheet - distance
             } else if inside {
                 distance
             } else {
@@ -94,7 +95,8 @@ pub(super) fn of_mesh(
         distances,
         colors: noted.iter().map(|noted| noted.map_or(0, |(key, _)| palette.byte(key))).collect(),
         palette: palette.materials,
-        bound: bound(step) + if open { step * 0.75 } else { 0.0 },
+        half_sheet,
+        bound: bound(step) + half_sheet,
         why: format!("{x}x{y}x{z} signed distances{sheet}"),
     })
 }

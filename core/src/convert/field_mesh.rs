@@ -45,6 +45,12 @@ struct VolumeSurface<'a> {
     level: f64,
 }
 
+impl<'a> VolumeSurface<'a> {
+    fn of(volume: &'a Volume) -> Self {
+        Self { volume, bounds: volume.bounds(), level: f64::from(volume.transfer.surface_value()) }
+    }
+}
+
 impl Field for VolumeSurface<'_> {
     fn value(&self, p: DVec3) -> f64 {
         let value = self.volume.value(p);
@@ -126,10 +132,9 @@ fn size_of_contour(mesh: &Mesh, times: f64) -> MeshSize {
 }
 
 /// Tells how large a mesh [`of_volume`] would make: two triangles for each edge between a sample inside and one outside,
-/// and a vertex for every two triangles, with a color; at creases there are more.
+/// and for each cell that the surface crosses a vertex with a color, or several at a crease. How many is found out in
+/// some layers of cells.
 pub(super) fn forecast_of_volume(volume: &Volume) -> MeshSize {
-    /// Vertices for each edge, from clouds to bones.
-    const VERTICES: f64 = 1.2;
     let level = volume.transfer.surface_value();
     let [nx, ny, nz] = volume.size().map(|s| s as usize);
     let is_inside = |i: usize| volume.samples().get(i) >= level;
@@ -146,20 +151,33 @@ pub(super) fn forecast_of_volume(volume: &Volume) -> MeshSize {
             }
         }
     }
-    let edges = edges as f64;
-    MeshSize { vertices: edges * VERTICES, triangles: edges * 2.0, each: [36.0, 12.0], is_exact: false }
+    let cells = surface_cells(volume);
+    let vertices = cells.len() as f64 * vertices_a_cell(volume, &cells);
+    MeshSize { vertices, triangles: edges as f64 * 2.0, each: [36.0, 12.0], is_exact: false }
+}
+
+/// Finds the surface in some layers of cells, and counts the vertices of a cell.
+fn vertices_a_cell(volume: &Volume, cells: &[[u32; 3]]) -> f64 {
+    /// Layers that lie together; the outer ones only serve those between.
+    const LAYERS: u32 = 6;
+    /// Cells in which the surface is found.
+    const CELLS: usize = 8192;
+    let groups = volume.size()[2] / LAYERS + 1;
+    let every = (cells.len() / CELLS) as u32 + 1;
+    let first = (groups / 2) % every;
+    let few: Vec<[u32; 3]> = cells.iter().copied().filter(|c| c[2] / LAYERS % every == first).collect();
+    let is_inner = |layer: u32| every == 1 || (1..LAYERS - 1).contains(&(layer % LAYERS));
+    let (surface, grid) = (VolumeSurface::of(volume), Grid::of(volume));
+    let mesh = contour(&surface, &grid, &few, &OneThread);
+    let layer_of = |p: &Vec3| ((f64::from(p.z) - grid.first.z) / grid.step.z) as u32;
+    let vertices = mesh.positions.iter().filter(|p| is_inner(layer_of(p))).count();
+    let inner = few.iter().filter(|c| is_inner(c[2])).count();
+    if inner == 0 { 1.0 } else { vertices as f64 / inner as f64 }
 }
 
 /// Triangulates the surface of a volume at the resolution of its samples; the bound is a cell's diagonal.
 pub(super) fn of_volume(volume: &Volume, threads: &dyn Threads) -> (Mesh, f64) {
-    let surface =
-        VolumeSurface { volume, bounds: volume.bounds(), level: f64::from(volume.transfer.surface_value()) };
-    let grid = Grid {
-        first: volume.bounds().min - volume.spacing() * 0.5,
-        step: volume.spacing(),
-        cell: volume.spacing().length(),
-        size: volume.size().map(|s| s + 1),
-    };
+    let (surface, grid) = (VolumeSurface::of(volume), Grid::of(volume));
     let cells = surface_cells(volume);
     let mut mesh = contour(&surface, &grid, &cells, threads);
     mesh.colors = mesh
@@ -226,6 +244,16 @@ impl Grid {
         // An odd offset keeps flat faces, which like to lie on simple fractions, off the grid planes.
         let first = bounds.center() - covered * 0.5 + DVec3::new(0.0131, 0.0077, 0.0109) * step;
         Self { first, step: DVec3::splat(step), cell: step, size }
+    }
+
+    /// Lays cells between the samples of a volume, and around them.
+    fn of(volume: &Volume) -> Self {
+        Self {
+            first: volume.bounds().min - volume.spacing() * 0.5,
+            step: volume.spacing(),
+            cell: volume.spacing().length(),
+            size: volume.size().map(|s| s + 1),
+        }
     }
 
     fn corner(&self, cell: [u32; 3]) -> DVec3 {

@@ -6,6 +6,7 @@
 //! as long as the shape lives, and shared by all who ask again.
 
 mod cache;
+mod chunks;
 mod distance;
 mod field_mesh;
 mod height_mesh;
@@ -14,7 +15,6 @@ mod primitive_mesh;
 mod voxel_mesh;
 mod voxelize;
 
-use crate::math::Aabb;
 use crate::parallel::Threads;
 use crate::scene::{Material, Mesh, Object, Scene, Shape, Voxels};
 use cache::Cache;
@@ -115,6 +115,9 @@ pub struct DistanceModel {
     pub colors: Vec<u8>,
     /// Materials of the surface.
     pub palette: Vec<Material>,
+    /// Half of the thickness, object space, that a surface which encloses nothing was given so that it has an inside;
+    /// 0 for bodies. The surface itself lies in the middle.
+    pub half_sheet: f64,
     /// Bound on the distance between the surfaces, in world space.
     pub bound: f64,
     /// What was done, for the report.
@@ -312,11 +315,8 @@ impl Converter {
         let scale = scale_of(object);
         let tolerance = detail.in_object(object);
         let (size, cell) = voxelize::grid_size(&object.shape.bounds(), tolerance, detail.max_resolution);
-        let chunks = match &*object.shape {
-            Shape::FreeForm(form) => voxelize::chunks_of_form(form, size, cell),
-            _ => size.map(|s| u64::from(s.div_ceil(crate::scene::CHUNK))).iter().product::<u64>(),
-        };
-        let bytes = chunks * u64::from(crate::scene::CHUNK).pow(3);
+        let grid = voxelize::Grid::around(&object.shape.bounds(), size, cell);
+        let bytes = chunks::taken(scene, object, &grid) * u64::from(crate::scene::CHUNK).pow(3);
         let [x, y, z] = size;
         Forecast::of_grid(bytes, cell * 3f64.sqrt() * scale, format!("{x}x{y}x{z} voxels"))
     }
@@ -332,7 +332,7 @@ impl Converter {
         let tolerance = detail.in_object(object);
         // The grid lies around the triangles that it is made of: cells that are empty have none.
         let bounds = match &*object.shape {
-            Shape::Voxels(voxels) => filled_bounds(voxels),
+            Shape::Voxels(voxels) => voxels.filled_bounds(),
             shape => shape.bounds(),
         };
         let (size, step) = distance::grid_size(&bounds, tolerance, detail.max_resolution);
@@ -360,16 +360,6 @@ fn scale_of(object: &Object) -> f64 {
 fn extent_of(object: &Object) -> f64 {
     let size = object.shape.bounds().radius();
     if size > 0.0 && size.is_finite() { size } else { 1.0 }
-}
-
-/// Returns the box around the cells that hold something.
-fn filled_bounds(voxels: &Voxels) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    voxels.for_each_filled(|cell, _| {
-        let low = DVec3::from_array(cell.map(f64::from));
-        bounds = bounds.with(low).with(low + 1.0);
-    });
-    bounds
 }
 
 /// Tells for each palette byte whether light passes through.

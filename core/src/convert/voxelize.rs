@@ -23,28 +23,6 @@ pub(super) fn grid_size(bounds: &Aabb, tolerance: f64, max_resolution: u32) -> (
     (size, cell)
 }
 
-/// Counts the chunks of a form's grid that can hold anything: its bounds are wider than the form.
-pub(super) fn chunks_of_form(form: &FreeForm, size: [u32; 3], cell: f64) -> u64 {
-    const CHUNK: u32 = crate::scene::CHUNK;
-    let covered = DVec3::from_array(size.map(f64::from)) * cell;
-    let first = form.bounds().center() - covered * 0.5;
-    // In small parts: intervals are wide over much space.
-    let part = CHUNK / 16;
-    let corner = |at: [u32; 3]| first + DVec3::from_array(at.map(f64::from)) * cell;
-    let holds = |low: [u32; 3]| {
-        (0..4096u32).any(|i| {
-            let from: [u32; 3] = std::array::from_fn(|a| low[a] + (i >> (4 * a) & 15) * part);
-            let to: [u32; 3] = std::array::from_fn(|a| (from[a] + part).min(size[a]));
-            (0..3).all(|a| from[a] < size[a])
-                && form.form().interval(&Aabb::new(corner(from), corner(to))).hi >= 0.0
-        })
-    };
-    let count = size.map(|s| s.div_ceil(CHUNK));
-    let chunks = (0..count.iter().product())
-        .map(|i| [i % count[0], i / count[0] % count[1], i / (count[0] * count[1])].map(|c: u32| c * CHUNK));
-    chunks.filter(|&low| holds(low)).count() as u64
-}
-
 pub(super) fn voxelize(
     scene: &Scene,
     object: &Object,
@@ -63,8 +41,7 @@ pub(super) fn voxelize(
         });
     }
     let (size, cell) = grid_size(&bounds, tolerance, max_resolution);
-    let covered = DVec3::from_array(size.map(f64::from)) * cell;
-    let grid = Grid { size, cell, first: bounds.center() - covered * 0.5 };
+    let grid = Grid::around(&bounds, size, cell);
     let mut slabs: Vec<Slab> = (0..size[2]).step_by(SLAB as usize).map(|z| Slab::new(size, z)).collect();
     match &*object.shape {
         Shape::Mesh(mesh) => fill_mesh(scene, object, mesh, &grid, &mut slabs, threads),
@@ -136,18 +113,24 @@ fn choose_colors(
 }
 
 /// A box of cubic cells in object space.
-struct Grid {
-    size: [u32; 3],
-    cell: f64,
+pub(super) struct Grid {
+    pub(super) size: [u32; 3],
+    pub(super) cell: f64,
     first: DVec3,
 }
 
 impl Grid {
-    fn corner(&self, cell: [u32; 3]) -> DVec3 {
+    /// Lays cells around a box, as much over on either side.
+    pub(super) fn around(bounds: &Aabb, size: [u32; 3], cell: f64) -> Self {
+        let covered = DVec3::from_array(size.map(f64::from)) * cell;
+        Self { size, cell, first: bounds.center() - covered * 0.5 }
+    }
+
+    pub(super) fn corner(&self, cell: [u32; 3]) -> DVec3 {
         self.first + DVec3::from_array(cell.map(f64::from)) * self.cell
     }
 
-    fn clamp_cell(&self, p: DVec3) -> [u32; 3] {
+    pub(super) fn clamp_cell(&self, p: DVec3) -> [u32; 3] {
         let c = ((p - self.first) / self.cell).floor();
         std::array::from_fn(|a| c[a].clamp(0.0, f64::from(self.size[a] - 1)) as u32)
     }
@@ -282,7 +265,7 @@ fn fill_triangle(scene: &Scene, object: &Object, mesh: &Mesh, t: usize, grid: &G
 /// Tells whether a triangle and a box share a point.
 ///
 /// Source: T. Akenine-Möller, *Fast 3D triangle-box overlap testing*, JGT 6(1), 2001 (separating axes).
-fn triangle_touches_box(corners: [DVec3; 3], middle: DVec3, half: DVec3) -> bool {
+pub(super) fn triangle_touches_box(corners: [DVec3; 3], middle: DVec3, half: DVec3) -> bool {
     let [a, b, c] = corners.map(|p| p - middle);
     let edges = [b - a, c - b, a - c];
     let separated = |axis: DVec3| {

@@ -61,7 +61,10 @@ impl Voxels {
                     cells[cell_index(0, y, z)..][..row.len()].copy_from_slice(row);
                 }
             }
-            if cells.iter().any(|&b| b != 0) {
+            // Cells beyond the grid are empty: only whole chunks are one value.
+            if cells.iter().all(|&b| b == cells[0]) {
+                grid.chunks[index] = Chunk::Uniform(cells[0]);
+            } else {
                 grid.chunks[index] = Chunk::Cells(cells.into());
             }
         }
@@ -228,6 +231,40 @@ impl Voxels {
         cells
     }
 
+    /// Returns the box around the cells that hold something, one meter to a cell; empty where there is none.
+    #[must_use]
+    pub fn filled_bounds(&self) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            let first = self.chunk_origin(index);
+            let end: [u32; 3] = std::array::from_fn(|a| CHUNK.min(self.size[a] - first[a]));
+            let place =
+                |cell: [u32; 3]| DVec3::from_array(std::array::from_fn(|a| f64::from(first[a] + cell[a])));
+            let whole = Aabb::new(place([0; 3]), place(end));
+            match chunk {
+                Chunk::Uniform(0) => {}
+                // What lies within the box already cannot make it larger.
+                _ if bounds.with(whole.min).with(whole.max) == bounds => {}
+                Chunk::Uniform(_) => bounds = bounds.with(whole.min).with(whole.max),
+                Chunk::Cells(cells) => {
+                    for z in 0..end[2] {
+                        for y in 0..end[1] {
+                            let row = &cells[cell_index(0, y, z)..][..end[0] as usize];
+                            let Some(from) = row.iter().position(|&b| b != 0) else { continue };
+                            let to = row.iter().rposition(|&b| b != 0).unwrap_or(from);
+                            bounds = bounds.with(place([from as u32, y, z])).with(place([
+                                to as u32 + 1,
+                                y + 1,
+                                z + 1,
+                            ]));
+                        }
+                    }
+                }
+            }
+        }
+        bounds
+    }
+
     /// Returns the bytes held, chunks shared with clones counted in full.
     #[must_use]
     pub fn bytes(&self) -> u64 {
@@ -249,6 +286,20 @@ fn cell_index(x: u32, y: u32, z: u32) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_box_around_what_is_there_is_no_larger() {
+        let mut grid = Voxels::new([130, 70, 66]);
+        assert!(grid.filled_bounds().is_empty());
+        let low = DVec3::new(3.0, 5.0, 7.0);
+        grid.set(3, 5, 7, 9);
+        assert_eq!(grid.filled_bounds(), Aabb::new(low, low + 1.0));
+        grid.set(129, 69, 64, 1);
+        assert_eq!(grid.filled_bounds(), Aabb::new(low, DVec3::new(130.0, 70.0, 65.0)));
+        let full = Voxels::from_bytes([64; 3], &[4; 64 * 64 * 64]);
+        assert_eq!(full.bytes(), 16, "a chunk of one value is that value");
+        assert_eq!(full.filled_bounds(), Aabb::new(DVec3::ZERO, DVec3::splat(64.0)));
+    }
 
     #[test]
     fn cells_read_back_over_chunk_borders() {

@@ -4,7 +4,7 @@
 use super::demand::why_not_drawn;
 use super::need::Need;
 use crate::math::Aabb;
-use crate::scene::{Object, Primitive, Scene, Shape};
+use crate::scene::{Object, Primitive, Scene, Shape, Volume};
 
 /// What the rays of a picture are likely to meet.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -78,12 +78,47 @@ impl Survey {
         survey
     }
 
+    /// Returns how many samples a ray takes of a volume, `step` spacings apart: where there is something to be seen, and few
+    /// where there is nothing.
+    #[must_use]
+    pub fn samples(&self, index: usize, object: &Object, step: f64) -> f64 {
+        let Shape::Volume(volume) = &*object.shape else { return 0.0 };
+        let scale = object.world_from_object.matrix3.determinant().abs().cbrt();
+        let all = self.length[index] / (volume.spacing().min_element() * scale * step).max(1e-300);
+        all * (EMPTY + (1.0 - EMPTY) * occupied(volume))
+    }
+
     /// Sums what the picture's rays cost: `cost` is that of one ray against an object.
     #[must_use]
     pub fn sum(&self, scene: &Scene, cost: impl Fn(usize, &Object) -> f64) -> f64 {
         let things = scene.objects.iter().enumerate().zip(&self.tested);
         things.filter(|(_, tested)| **tested > 0.0).map(|((i, o), tested)| tested * cost(i, o)).sum()
     }
+}
+
+/// What it takes to pass by a sample in empty space, against one that is seen.
+const EMPTY: f64 = 0.15;
+
+/// Edge of the blocks of samples that are passed by where all of them are empty.
+const BLOCK: usize = 8;
+
+/// Returns the share of a volume's blocks in which something is seen, from some of them.
+fn occupied(volume: &Volume) -> f64 {
+    /// Most blocks that are looked at.
+    const MOST: usize = 2048;
+    let size = volume.size().map(|s| s as usize);
+    let blocks = size.map(|s| s.div_ceil(BLOCK));
+    let all: usize = blocks.iter().product();
+    let is_seen = |i: usize| volume.transfer.at(volume.samples().get(i)).1 > 0.0;
+    let holds = |block: usize| {
+        let at = [block % blocks[0], block / blocks[0] % blocks[1], block / (blocks[0] * blocks[1])];
+        let span = |a: usize| at[a] * BLOCK..((at[a] + 1) * BLOCK).min(size[a]);
+        span(2).any(|z| span(1).any(|y| span(0).any(|x| is_seen((z * size[1] + y) * size[0] + x))))
+    };
+    // An odd stride does not stay in one column.
+    let looked = (0..all).step_by((all / MOST) | 1);
+    let count = looked.len().max(1) as f64;
+    looked.filter(|&block| holds(block)).count() as f64 / count
 }
 
 /// Returns the box of an object that is drawn, and the share of rays into it that meet its surface.
@@ -99,7 +134,12 @@ fn bounds_and_fill(object: &Object) -> Option<(Aabb, f64)> {
         // Light passes through it.
         Shape::Volume(_) => 0.0,
     };
-    Some((object.bounds(), fill))
+    let bounds = match &*object.shape {
+        // A grid may be larger than what is in it.
+        Shape::Voxels(voxels) => voxels.filled_bounds().transformed(&object.world_from_object),
+        _ => object.bounds(),
+    };
+    Some((bounds, fill))
 }
 
 #[cfg(test)]

@@ -42,6 +42,30 @@ fn functions() -> Vec<Case> {
             ..base()
         },
         Case {
+            id: "close-roots",
+            title: "A bumpy disc, thinner and thinner: rays meet its faces at places that nearly coincide",
+            parameter: "thickness over radius",
+            values: powers(-1, -7),
+            limit: 0.002,
+            counted: "share of pixels where counting the roots along the ray (Sturm) says otherwise",
+            backends: &["reference", "freeform"],
+            build: disc,
+            count: Count::Roots,
+            ..base()
+        },
+        Case {
+            id: "first-roots",
+            title: "A ball with more and more bumps and dents, of which rays meet many",
+            parameter: "functions",
+            values: vec![1.0, 3.0, 10.0, 30.0, 100.0],
+            limit: 0.002,
+            counted: "share of pixels where counting the roots along the ray (Sturm) says otherwise",
+            backends: &["reference", "freeform"],
+            build: rugged,
+            count: Count::Roots,
+            ..base()
+        },
+        Case {
             id: "rim",
             title: "A dent whose support reaches less and less into a ball",
             parameter: "overlap over radius",
@@ -134,6 +158,19 @@ fn fields() -> Vec<Case> {
             ..base()
         },
         Case {
+            id: "volume-borders",
+            title: "A cloud in a larger and larger grid, so that the borders of bricks lie elsewhere in it",
+            parameter: "empty layers of samples before it",
+            values: vec![0.0, 1.0, 3.0, 4.0, 7.0],
+            is_logarithmic: false,
+            limit: 0.004,
+            counted: "color difference to the picture without empty layers",
+            backends: &["reference", "freeform"],
+            build: padded_cloud,
+            count: Count::Change,
+            ..base()
+        },
+        Case {
             id: "volume-slabs",
             title: "A block of even fog, seen nearer and nearer to straight: rays along its faces",
             parameter: "tilt, degrees",
@@ -200,6 +237,31 @@ fn rim(overlap: f64) -> Setup {
     of_form(Form::Perturbed { base: Box::new(ball(DVec3::ZERO, 1.0)), terms: vec![term] }, front())
 }
 
+/// A disc so thin, with bumps on it.
+fn disc(thickness: f64) -> Setup {
+    let bump = |x: f64, y: f64, weight: f64| Perturbation {
+        weight,
+        power: Power::Square,
+        function: ball(DVec3::new(x, y, 0.0), 0.4),
+    };
+    let base = Form::Ellipsoid { center: DVec3::ZERO, radii: DVec3::new(1.0, 0.8, thickness) };
+    let terms = vec![bump(0.3, 0.2, 0.5), bump(-0.4, 0.1, -0.4), bump(0.1, -0.4, 0.7)];
+    of_form(Form::Perturbed { base: Box::new(base), terms }, front())
+}
+
+/// A ball with so many bumps and dents, all of quadrics.
+fn rugged(count: f64) -> Setup {
+    let term = |i: u32| {
+        let height = 1.0 - 2.0 * (f64::from(i) + 0.5) / count;
+        let (angle, around) = (f64::from(i) * 2.399_963, (1.0 - height * height).sqrt());
+        let center = DVec3::new(around * angle.cos(), height, around * angle.sin());
+        let weight = if i % 2 == 0 { 0.6 } else { -0.8 };
+        Perturbation { weight, power: Power::Square, function: ball(center, 1.6 / count.sqrt().max(2.0)) }
+    };
+    let terms = (0..count as u32).map(term).collect();
+    of_form(Form::Perturbed { base: Box::new(ball(DVec3::ZERO, 1.0)), terms }, front())
+}
+
 /// A ball with a bump that is bent by a bump, and so on.
 fn recursion(depth: f64) -> Setup {
     let mut form = ball(DVec3::new(0.4, 0.5, 0.7), 0.3);
@@ -262,14 +324,22 @@ fn under_heights(gap: f64) -> Setup {
 }
 
 fn of_volume(samples: impl Fn(DVec3) -> f32, camera: Camera) -> Setup {
-    const EDGE: u32 = 33;
+    of_padded_volume(0, samples, camera)
+}
+
+/// A volume with so many empty layers before it along each axis; what is in it stays where it was.
+fn of_padded_volume(layers: u32, samples: impl Fn(DVec3) -> f32, camera: Camera) -> Setup {
+    let edge = 33 + layers;
     let value = |i: u32| {
-        let cell = [i % EDGE, i / EDGE % EDGE, i / (EDGE * EDGE)];
-        samples((DVec3::from_array(cell.map(f64::from)) - 16.0) / 16.0)
+        let cell = [i % edge, i / edge % edge, i / (edge * edge)].map(|c| f64::from(c) - f64::from(layers));
+        if cell.iter().any(|c| *c < 0.0) {
+            return 0.0;
+        }
+        samples((DVec3::from_array(cell) - 16.0) / 16.0)
     };
-    let samples = Samples::F32((0..EDGE * EDGE * EDGE).map(value).collect());
+    let samples = Samples::F32((0..edge.pow(3)).map(value).collect());
     let mut scene = studio();
-    if let Ok(mut volume) = Volume::new([EDGE; 3], DVec3::splat(2.0 / 32.0), samples) {
+    if let Ok(mut volume) = Volume::new([edge; 3], DVec3::splat(2.0 / 32.0), samples) {
         let point = |value: f32, color: Vec3, opacity: f32| TransferPoint { value, color, opacity };
         volume.transfer = TransferFunction {
             points: vec![
@@ -281,7 +351,7 @@ fn of_volume(samples: impl Fn(DVec3) -> f32, camera: Camera) -> Setup {
             ],
             reference_length: 2.0 / 32.0,
         };
-        let corner = -volume.bounds().center();
+        let corner = -volume.bounds().center() - DVec3::splat(f64::from(layers) / 32.0);
         scene.objects.push(Object::new("cloud", Shape::Volume(volume), 0).at(corner));
     }
     setup(scene, camera)
@@ -293,6 +363,11 @@ fn volume_step(step: f64) -> Setup {
     setup.settings.push(("volume.step", step.to_string()));
     setup.ruler_settings.push(("volume.step", "0.05".to_owned()));
     setup
+}
+
+/// A ball of haze around a layer that stands out, with so many empty layers of samples before it.
+fn padded_cloud(layers: f64) -> Setup {
+    of_padded_volume(layers as u32, |p| (0.9 - p.length()).clamp(0.0, 1.0) as f32, front())
 }
 
 /// The same value everywhere, so that no gradient says where the surface faces, seen along an axis.

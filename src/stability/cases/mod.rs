@@ -1,8 +1,70 @@
 //! Which cases are there?
+//!
+//! What is known to break methods of each kind, and the case that draws it. What no picture can show stands with the test
+//! that counts it; what nothing here can draw says why.
+//!
+//! | any back end | case |
+//! |---|---|
+//! | a camera far away, tiny and huge scenes | `far-camera`, `tiny-scenes`, `huge-scenes` |
+//! | far from the origin, trembling there | `far-from-origin`, `trembling` |
+//! | grazing views | `grazing`, `texture-grazing` |
+//! | coplanar and nearly coplanar faces, flicker | `coplanar`, `coplanar-flicker` |
+//! | thin things, small things | `thin`, `thin-flicker`, `specks` |
+//! | the near plane, the eye inside | `near`, `near-voxels`, `under-heights` |
+//! | shadows: contact and slope | `shadow-contact`, `shadow-slope` |
+//! | wide lenses | `field-of-view`, `fisheye` |
+//! | motion | `motion` |
+//! | input that is no number, no area, no scene | `degenerate` |
+//! | load | `load-objects`, `load-triangles`, `load-lights`, `load-pixels` |
+//! | threads | `threads`; lanes: `src/conformance/pictures.rs` |
+//!
+//! | triangles | case |
+//! |---|---|
+//! | shared edges, pixel centers, slivers, T-junctions | `shared-edges`, `slivers`, `t-junctions` |
+//! | a floor from behind the eye, huge coordinates | `huge-triangles` |
+//! | no numbers, infinite ones, w below zero | `degenerate`, `near` |
+//! | targets of 1 to 20001 pixels | `strips` |
+//! | resolution of depth | `depth-resolution` |
+//! | order of triangles | `triangle-order` |
+//! | shadows: acne, gaps, leaks, swimming | `shadow-slope`, `shadow-contact`, `light-leaks`, `shadow-swim` |
+//! | early or hierarchical tests of depth on and off | none: the rasterizer has no such switch, so there is nothing to compare |
+//!
+//! | voxels | case |
+//! |---|---|
+//! | rays along edges and through corners, diagonal walls | `voxel-edges`, `voxel-corners` |
+//! | rays without direction, denormal ones, reversed ones; order, neighbors and number of steps | `backends/voxel/src/walk/tests.rs`: they have no picture |
+//! | the eye on a face, an edge, inside | `near-voxels` |
+//! | far away, long ways, caps on steps | `far-voxels`, `long-grids` |
+//! | edits, also in the middle of a frame | `edits`, `edits-midway` |
+//! | reflections cut off | `mirrors` |
+//! | conversion: watertight for 6 and 26 neighbors | `floods` (what stops water at corners stops it at faces) |
+//! | conversion: open, turned over, needles, another order | `open-meshes`, `turned-triangles`, `warped-quads`, `triangle-order` |
+//! | conversion: volume to the closed form | `core/src/convert/voxelize.rs`: no back end draws a volume in cubic meters |
+//!
+//! | free forms | case |
+//! |---|---|
+//! | tangent rays, silhouettes | `tangent` |
+//! | quadrics that are none, coefficients by powers of ten | `degenerate-quadrics`, `small-coefficients`, `large-coefficients` |
+//! | double roots and close pairs, thin walls | `close-roots`, `shell` |
+//! | the first of many roots, held against Sturm's count | `first-roots` |
+//! | the rim of a support, recursion, many functions | `rim`, `recursion`, `functions` |
+//! | bounds of intervals | `core/src/math.rs`, `core/src/scene/form.rs`: they have no picture |
+//! | heights: vertical rays, below, spikes, odd sizes | `vertical-heights`, `under-heights`, `spike`, `height-sizes` |
+//! | volumes: steps, even fog, rays along faces | `volume-step`, `volume-slabs` |
+//! | volumes: borders of bricks | `volume-borders` |
+//! | volumes: skipping of what is empty on and off | none: it is no switch; `volume-borders` moves what is skipped |
+//!
+//! | lines | case |
+//! |---|---|
+//! | flicker | `contour-flicker` |
+//! | false lines, missing lines | `false-lines`, `missing-lines` |
+//! | bands that crawl | `band-crawl` |
+//! | small objects | `specks` |
 
 mod forms;
 mod lines;
 mod loads;
+mod promises;
 mod surfaces;
 mod voxels;
 
@@ -30,6 +92,7 @@ pub fn cases() -> Vec<Case> {
     all.extend(surfaces::cases());
     all.extend(voxels::cases());
     all.extend(forms::cases());
+    all.extend(promises::cases());
     all.extend(lines::cases());
     all.extend(loads::cases());
     all
@@ -363,4 +426,23 @@ fn shapes() -> Vec<Case> {
             ..base()
         },
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn every_case_stands_in_the_table_and_what_stands_there_is_one() {
+        let own = include_str!("mod.rs");
+        let table: Vec<&str> = own.lines().filter(|l| l.starts_with("//! |")).collect();
+        let mut named: Vec<&str> = table.iter().flat_map(|l| l.split('`').skip(1).step_by(2)).collect();
+        named.retain(|n| !n.contains('/'));
+        let ids: Vec<&str> = super::cases().iter().map(|c| c.id).collect();
+        let missing: Vec<_> = ids.iter().filter(|id| !named.contains(id)).collect();
+        let unknown: Vec<_> = named.iter().filter(|n| !ids.contains(n)).collect();
+        assert!(missing.is_empty() && unknown.is_empty(), "missing {missing:?}, unknown {unknown:?}");
+        let paths = table.iter().flat_map(|l| l.split('`').skip(1).step_by(2)).filter(|n| n.contains('/'));
+        for path in paths {
+            assert!(std::path::Path::new(path).exists(), "{path}");
+        }
+    }
 }

@@ -4,7 +4,7 @@ use super::super::count::Count;
 use super::super::scenes::{HEIGHT, Setup, look, perspective, setup, studio};
 use super::{Case, base, powers};
 use crate::camera::{Camera, Projection};
-use crate::prelude::{DVec3, Material, Mesh, Object, Primitive, Shape, Vec3, Voxels};
+use crate::prelude::{DAffine3, DQuat, DVec3, Material, Mesh, Object, Primitive, Shape, Vec3, Voxels};
 use std::sync::Arc;
 
 pub(super) fn cases() -> Vec<Case> {
@@ -62,6 +62,32 @@ pub(super) fn cases() -> Vec<Case> {
             backends: &["reference", "raster", "voxel"],
             build: edits,
             count: Count::Edited,
+            ..base()
+        },
+        Case {
+            id: "long-grids",
+            title: "A tunnel of voxels, longer and longer, with a wall at its end",
+            parameter: "cells",
+            values: vec![100.0, 316.0, 1000.0, 3162.0, 10_000.0],
+            limit: 0.0,
+            counted: "share of holes",
+            is_promise: true,
+            backends: &["raster", "voxel"],
+            build: tunnel,
+            count: Count::Hole,
+            ..base()
+        },
+        Case {
+            id: "floods",
+            title: "A hollow ball of triangles as finer and finer voxels, with water around it",
+            parameter: "cells along an edge",
+            values: vec![16.0, 23.0, 32.0, 47.0, 64.0, 97.0, 128.0],
+            limit: 0.0,
+            counted: "share of the cells inside that water reaches through faces, edges and corners of cells",
+            is_promise: true,
+            backends: &["voxel"],
+            build: hollow_ball,
+            count: Count::Flood,
             ..base()
         },
         Case {
@@ -189,6 +215,27 @@ fn edits(count: f64) -> Setup {
         history.push(Arc::new(scene.clone()));
     }
     Setup { history, ..setup(scene, view) }
+}
+
+/// A floor of so many cells with a wall at its end, seen from just above the other end: no ray can jump far.
+fn tunnel(cells: f64) -> Setup {
+    let length = cells as u32;
+    let tunnel = Voxels::from_fn([8, 8, length], |_, y, z| u8::from(y == 0 || z == 0));
+    let mut scene = studio();
+    scene.objects.push(Object::new("tunnel", Shape::Voxels(tunnel), 0));
+    let eye = DVec3::new(4.0, 2.0, cells + 1.0);
+    setup(scene, look(eye, DVec3::new(4.0, 4.0, 0.0), 4.0 / cells))
+}
+
+/// A hollow ball of triangles, turned so that none lies along the grid, in so many cells.
+fn hollow_ball(cells: f64) -> Setup {
+    let mut scene = studio();
+    let turned = DAffine3::from_quat(DQuat::from_rotation_x(0.3) * DQuat::from_rotation_z(0.7));
+    scene.objects.push(Object::new("ball", Shape::Mesh(crate::chart::ball(48)), 0).placed(turned));
+    let mut setup = setup(scene, look(DVec3::new(1.0, 1.5, 4.0), DVec3::ZERO, 0.7));
+    setup.need.tolerance_px = 1e-3;
+    setup.settings.push(("detail.resolution", format!("{cells:.0}")));
+    setup
 }
 
 /// A room of two mirrors that face each other, with a ball between them.
