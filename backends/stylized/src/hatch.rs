@@ -77,6 +77,8 @@ pub(crate) struct Hatching {
     half_width: f32,
     /// Darkness at which a stroke of each order begins, for both families; the first is for order 0.
     begins: [[f32; MOST_LEVELS]; 2],
+    /// The least of those of each family.
+    earliest: [f32; 2],
     /// By what that changes until the next map.
     changes: [[f32; MOST_LEVELS]; 2],
     /// Darkness in which a stroke grows to its width.
@@ -102,8 +104,11 @@ impl Hatching {
         let float = |name: &str| settings.float(declared, name) as f32;
         let names = if set == Set::Images { settings.text(declared, "hatch.images") } else { "" };
         let files: Vec<&str> = names.split(',').map(str::trim).filter(|f| !f.is_empty()).collect();
-        if set == Set::Images && (files.is_empty() || files.len() > 64) {
-            return Err(HatchError(format!("hatch.images: name 1 to 64 pictures, not {}", files.len())));
+        if set == Set::Images && files.is_empty() {
+            return Ok(None);
+        }
+        if files.len() > 64 {
+            return Err(HatchError(format!("hatch.images: name at most 64 pictures, not {}", files.len())));
         }
         let count = match set {
             Set::Pencil | Set::Ink => 4,
@@ -145,6 +150,7 @@ impl Hatching {
             texture: float("hatch.texture"),
             half_width: float("hatch.width") * thickness,
             begins,
+            earliest: begins.map(|family| family.into_iter().fold(f32::MAX, f32::min)),
             changes,
             ramp: 1.0 / ramp.max(0.01),
             lightest: thresholds.iter().fold(f32::MAX, |a, &b| a.min(b))
@@ -228,6 +234,9 @@ impl Hatching {
         let pixels = F32x8::splat(1.0) / within;
         let mut clear = one;
         for family in 0..2 {
+            if !darkness.above(F32x8::splat(self.earliest[family])).any() {
+                continue;
+            }
             let (mut begin, mut change, mut thins) = (zero, zero, one);
             for i in 0..LANES {
                 let order = (orders[i] >> (8 + 16 * family) & 7) as usize;

@@ -81,7 +81,7 @@ fn hatching() -> Vec<Parameter> {
         choice("hatch", sets, "off", "strokes laid over dark tones"),
         text(
             "hatch.images",
-            "pictures of the levels from light to dark, separated by commas, for hatch=images",
+            "pictures of the levels from light to dark, separated by commas, for hatch=images; without any there are no strokes",
         ),
         text(
             "hatch.thresholds",

@@ -41,6 +41,7 @@ impl Ink {
     }
 
     /// Draws a line into rows that begin at a row of the picture.
+    #[inline(always)]
     pub(crate) fn draw(&mut self, stroke: &Stroke, styles: &Styles, first_row: u32, rows: u32) {
         let pen = styles.all[usize::from(stroke.style)].pen(stroke.kind);
         let half = pen.width * 0.5;
@@ -92,6 +93,7 @@ impl Ink {
     }
 
     /// Lays the lines of a row over its colors.
+    #[inline(always)]
     pub(crate) fn blend(&self, row: u32, styles: &Styles, colors: &mut [Vec3]) {
         let row = row as usize;
         if !self.touched[row] {

@@ -19,6 +19,7 @@
 //!  tone       two colors, and steps
 //!  hatch      strokes on dark tones
 //!  paper      what is under a drawing
+//!  lay        highlights and strokes on eight pixels
 //!  paint      a row of the picture
 //!  svg        lines as a file of vectors
 //! ```
@@ -32,6 +33,7 @@ mod edges;
 mod hatch;
 mod info;
 mod ink;
+mod lay;
 mod light;
 mod outline;
 mod paint;

@@ -142,6 +142,7 @@ impl Piece {
         }
         let facing = &facing[self.faces..self.faces + body.edges.planes.len()];
         let lens = Lens::of(body, sight);
+        let wires = style.pen(Kind::Wire).is_drawn;
         let skips_backs = body.edges.is_closed && !style.dashes_hidden;
         for edge in &body.edges.edges[self.first..self.last] {
             let first = facing[edge.faces[0] as usize];
@@ -150,6 +151,11 @@ impl Piece {
                 continue;
             }
             let turns = edge.faces[1] != NO_FACE && (first == second) == edge.is_turned;
+            // Most edges lie within a surface: they are no lines.
+            let is_within = edge.faces[1] != NO_FACE && edge.cosine >= style.crease_cosine;
+            if is_within && !(turns || edge.is_crowded || edge.parts_materials || wires) {
+                continue;
+            }
             let Some(kind) = kind_of(edge, turns, style) else { continue };
             let [a, b] = edge.ends.map(|i| lens.ahead(body.edges.places[i as usize]));
             let line = Line { kind, style: style_index, object: body.object, dashes: style.dashes_hidden };

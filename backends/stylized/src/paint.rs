@@ -1,7 +1,6 @@
 //! From visible surfaces to colors: tone, highlights, strokes, paper, and lines on top, row by row.
 
 use crate::cracks::shows_nothing;
-use crate::hatch::{EDGE, Hatching, Sticks};
 use crate::ink::{Ink, Sheaf};
 use crate::light::Lighting;
 use crate::paper::Grain;
@@ -9,14 +8,16 @@ use crate::style::{Highlight, Paper, Show, Style, Styles};
 use glam::{DVec3, Mat3, Vec3};
 use polyptych_core::camera::{Camera, Projection, RowDirections, View};
 use polyptych_core::framebuffer::{Band, Framebuffer};
-use polyptych_core::lanes::{F32x8, F64x8, I32x8, LANES, Mask8, Vec3x8};
+use polyptych_core::lanes::{F32x8, F64x8, I32x8, LANES, Vec3x8};
 use polyptych_core::scene::{Object, Scene};
-use polyptych_core::shade::{fogged, highlight};
+use polyptych_core::shade::fogged;
 
 /// Rows drawn by one worker at a time.
 pub(crate) const ROWS: u32 = 32;
 /// Columns whose background is filled at once.
 const GROUND: usize = 64;
+/// Columns over which its color changes evenly.
+const EVEN: usize = 16;
 
 /// How an object takes paint: what is the same for all its pixels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -91,18 +92,18 @@ pub(crate) struct Painting<'a> {
 
 /// Eight pixels of a row.
 #[derive(Clone, Copy)]
-struct Eight {
-    x: u32,
-    y: u32,
-    count: usize,
-    first: usize,
+pub(crate) struct Eight {
+    pub(crate) x: u32,
+    pub(crate) y: u32,
+    pub(crate) count: usize,
+    pub(crate) first: usize,
     /// Unit vectors from the eye.
-    direction: Vec3x8,
+    pub(crate) direction: Vec3x8,
 }
 
 /// Reads up to eight vectors; the rest are zero.
 #[inline(always)]
-fn gather(from: &[Vec3], first: usize, count: usize) -> Vec3x8 {
+pub(crate) fn gather(from: &[Vec3], first: usize, count: usize) -> Vec3x8 {
     let mut all = Vec3x8::splat(Vec3::ZERO);
     if count == LANES {
         let eight: &[Vec3; LANES] = from[first..first + LANES].try_into().expect("eight vectors");
@@ -116,7 +117,7 @@ fn gather(from: &[Vec3], first: usize, count: usize) -> Vec3x8 {
 }
 
 #[inline(always)]
-fn numbers(from: &[f32], first: usize, count: usize) -> F32x8 {
+pub(crate) fn numbers(from: &[f32], first: usize, count: usize) -> F32x8 {
     if count == LANES {
         return F32x8::load(&from[first..]);
     }
@@ -227,7 +228,13 @@ impl Painting<'_> {
 
     /// Returns the directions to the light of eight pixels.
     #[inline(always)]
-    fn toward(&self, x: usize, y: u32, count: usize, directions: Option<&RowDirections>) -> Vec3x8 {
+    pub(crate) fn toward(
+        &self,
+        x: usize,
+        y: u32,
+        count: usize,
+        directions: Option<&RowDirections>,
+    ) -> Vec3x8 {
         if let Some(uniform) = self.light.uniform {
             return Vec3x8::splat(uniform);
         }
@@ -297,7 +304,18 @@ impl Painting<'_> {
         } else if paper.is_shown {
             self.grain.paper(paper, x, y, colors);
         } else if let Some(directions) = directions {
-            directions.fill(&self.scene.environment.background, x, colors);
+            // Between places so near the background's color changes evenly.
+            let gradient = self.scene.environment.background.gradient();
+            let color_at = |column: u32| gradient.color(directions.at(column).y);
+            let mut begin = color_at(x);
+            for (piece, colors) in (1..).zip(colors.chunks_mut(EVEN)) {
+                let end = color_at(x + piece * EVEN as u32);
+                let step = (end - begin) * (1.0 / EVEN as f32);
+                for (i, color) in colors.iter_mut().enumerate() {
+                    *color = begin + step * i as f32;
+                }
+                begin = end;
+            }
         } else {
             for (x, color) in (x..).zip(colors) {
                 let ray = self.view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
@@ -333,7 +351,7 @@ impl Painting<'_> {
         if style.show != Show::Style {
             return self.study(style.show, eight);
         }
-        let Eight { count, first, direction, .. } = *eight;
+        let Eight { count, first, .. } = *eight;
         let ids = &self.visible.id()[first..first + count];
         let mut own = gather(self.visible.albedo(), first, count);
         let coded = own;
@@ -343,11 +361,8 @@ impl Painting<'_> {
         let cosine = F32x8::load(&facing[at..]);
         let slope = if style.tone.steps > 1 {
             // On the smooth side: next to another surface or a shadow the other difference says nothing.
-            let steepness = |before: usize, after: usize| {
-                let (before, after) = (F32x8::load(&facing[before..]), F32x8::load(&facing[after..]));
-                (cosine - before).abs().min((after - cosine).abs())
-            };
-            let (across, down) = (steepness(at - 1, at + 1), steepness(at - stride, at + stride));
+            let across = steepness(cosine, facing, at - 1, at + 1);
+            let down = steepness(cosine, facing, at - stride, at + stride);
             (across * across + down * down).sqrt()
         } else {
             F32x8::ZERO
@@ -371,7 +386,6 @@ impl Painting<'_> {
                 color.set(lane, fogged(&self.scene.environment, color.get(lane), f64::from(distance)));
             }
         }
-        let _ = direction;
         color.finite()
     }
 
@@ -391,7 +405,7 @@ impl Painting<'_> {
     }
 
     #[inline(always)]
-    fn look(&self, id: u32) -> Look {
+    pub(crate) fn look(&self, id: u32) -> Look {
         self.looks.get(id.wrapping_sub(1) as usize).copied().unwrap_or_default()
     }
 
@@ -416,229 +430,11 @@ impl Painting<'_> {
             own.set(lane, color);
         }
     }
-
-    /// Adds highlights.
-    #[inline(always)]
-    fn shine(&self, style: &Style, eight: &Eight, cosine: F32x8, color: Vec3x8) -> Vec3x8 {
-        let Eight { x, y, count, first, direction } = *eight;
-        let zero = F32x8::ZERO;
-        if !cosine.above(zero).any() {
-            return color;
-        }
-        let ids = &self.visible.id()[first..first + count];
-        let look = |id: u32| &self.looks[(id.wrapping_sub(1) as usize).min(self.looks.len() - 1)];
-        let first_look = look(ids[0].max(1));
-        let mut strength = F32x8::splat(first_look.specular);
-        let mut faint = F32x8::splat(first_look.faint);
-        let mut shininess = [first_look.shininess; LANES];
-        if ids.iter().any(|&id| id != ids[0]) {
-            for (lane, &id) in ids.iter().enumerate() {
-                let look = look(id);
-                (strength.0[lane], faint.0[lane], shininess[lane]) =
-                    (look.specular, look.faint, look.shininess);
-            }
-        }
-        if !strength.above(zero).any() {
-            return color;
-        }
-        let directions = if self.light.uniform.is_some() { None } else { self.view.row(y) };
-        let toward = self.toward(x as usize, y, count, directions.as_ref());
-        let normal = gather(self.visible.normal(), first, count);
-        let between = toward - direction;
-        let half = between.dot(normal) / between.length().max(F32x8::splat(f32::MIN_POSITIVE));
-        let faces = cosine.above(zero) & half.above(faint);
-        if !faces.any() {
-            return color;
-        }
-        let power = powers(half.max(zero), &shininess);
-        let lit = if self.visible.shadow().is_empty() || !style.shadow {
-            F32x8::splat(1.0)
-        } else {
-            numbers(self.visible.shadow(), first, count)
-        };
-        let share = match style.highlight {
-            Highlight::Off => return color,
-            Highlight::Soft => power * strength * lit,
-            Highlight::Hard => {
-                // The edge is where half of the light is left, as wide as a pixel by the change to the neighbor.
-                let mut change = zero;
-                for lane in 0..LANES {
-                    let beside = if lane + 1 < count { lane + 1 } else { lane.saturating_sub(1) };
-                    change.0[lane] = (power.0[beside] - power.0[lane]).abs();
-                }
-                let half = F32x8::splat(0.5);
-                let over = (power - half) / change.max(F32x8::splat(1e-3)) + half;
-                let full = (strength * F32x8::splat(2.5)).min(F32x8::splat(1.0));
-                over.max(zero).min(F32x8::splat(1.0)) * full * lit
-            }
-        };
-        color + Vec3x8::splat(style.highlight_color).scaled(faces.pick(share, zero))
-    }
-
-    /// Lays strokes on.
-    #[inline(always)]
-    fn hatch(
-        &self,
-        hatching: &Hatching,
-        style: &Style,
-        eight: &Eight,
-        origin: Vec3x8,
-        (own, coded, cosine): (Vec3x8, Vec3x8, F32x8),
-        color: Vec3x8,
-    ) -> Vec3x8 {
-        let Eight { x, y, count, first, direction } = *eight;
-        let (one, half) = (F32x8::splat(1.0), F32x8::splat(0.5));
-        let mut light = (one + cosine) * half;
-        if hatching.texture > 0.0 {
-            let luminance = own.dot(Vec3x8::splat(Vec3::new(0.2126, 0.7152, 0.0722)));
-            let dark = one - luminance.max(F32x8::ZERO).min(one).sqrt();
-            light = light * (one - dark * F32x8::splat(hatching.texture));
-        }
-        let darkness = one - light;
-        let ids = &self.visible.id()[first..first + count];
-        if !darkness.above(F32x8::splat(hatching.lightest)).any() {
-            return color;
-        }
-        let mut ink = F32x8::ZERO;
-        if hatching.sticks == Sticks::Screen {
-            let scale = F32x8::splat(1.0 / (EDGE as f32 * hatching.scale));
-            let u = I32x8::count_from(x as i32).to_f64().round() * scale;
-            let v = F32x8::splat(y as f32) * scale;
-            ink = hatching.ink(u, v, F32x8::splat(1.0 / hatching.scale), darkness);
-        } else {
-            let distance = numbers(self.visible.distance(), first, count);
-            let place = origin + direction.scaled(distance);
-            let pixel = self.view.pixel_size(1.0) as f32;
-            let is_parallel = matches!(self.camera.projection, Projection::Orthographic { .. });
-            let pixels = if is_parallel { F32x8::splat(pixel) } else { distance * F32x8::splat(pixel) };
-            let normal = gather(self.visible.normal(), first, count);
-            let mut lane = 0;
-            // Run by run of one object.
-            while lane < count {
-                let id = ids[lane];
-                let end = (lane + 1..count).find(|&next| ids[next] != id).unwrap_or(count);
-                let index = (id.wrapping_sub(1) as usize).min(self.looks.len() - 1);
-                if id != 0 {
-                    let look = &self.looks[index];
-                    let coordinates = (hatching.sticks == Sticks::Uv && look.is_coded).then_some(coded);
-                    let run = Run { look, lanes: lane..end, place, normal, pixels, coordinates };
-                    run.ink(hatching, darkness, &mut ink);
-                }
-                lane = end;
-            }
-        }
-        if style.paper.grain > 0.0 {
-            // Strokes skip the valleys of the paper.
-            let valley = one - self.grain.at(x, y);
-            ink = ink * (one - valley * F32x8::splat(0.9 * style.paper.grain));
-        }
-        let stroke =
-            Vec3x8::splat(hatching.color * (1.0 - hatching.own)) + own.scaled(F32x8::splat(hatching.own));
-        let share = ink * F32x8::splat(hatching.opacity);
-        color.scaled(one - share) + stroke.scaled(share)
-    }
 }
 
-/// Neighboring pixels of one object.
-struct Run<'a> {
-    look: &'a Look,
-    lanes: std::ops::Range<usize>,
-    /// Relative to the eye.
-    place: Vec3x8,
-    normal: Vec3x8,
-    /// Edge of a pixel there.
-    pixels: F32x8,
-    coordinates: Option<Vec3x8>,
-}
-
-impl Run<'_> {
-    /// Returns how much strokes cover of the pixels.
-    #[inline(always)]
-    fn ink(self, hatching: &Hatching, darkness: F32x8, ink: &mut F32x8) {
-        let Self { look, lanes, place, normal, pixels, coordinates } = self;
-        let texels = pixels * F32x8::splat(look.repeats * EDGE as f32);
-        let mut covered = F32x8::ZERO;
-        if let Some(coordinates) = coordinates {
-            // A texture is taken to be laid once around the body: six periods.
-            let scale = F32x8::splat(6.0 / hatching.scale);
-            let (u, v) = (coordinates.x * scale, coordinates.y * scale);
-            // By how much they change to the neighbor: how wide a pixel is in the pattern.
-            let mut density = texels;
-            for lane in lanes.clone().filter(|_| lanes.len() > 1) {
-                let beside = if lane + 1 < lanes.end { lane + 1 } else { lane - 1 };
-                let change = (u.0[beside] - u.0[lane]).hypot(v.0[beside] - v.0[lane]);
-                if change > 0.0 && change < 0.25 {
-                    density.0[lane] = change * EDGE as f32;
-                }
-            }
-            covered = hatching.ink(u, v, density, darkness);
-        } else {
-            let p = turned(&look.pattern, place) + Vec3x8::splat(look.eye);
-            let n = turned(&look.turn, normal);
-            let weights = [n.x.abs(), n.y.abs(), n.z.abs()];
-            // Along the axis that the surface faces most, and mixed with the next where they are much alike.
-            let (zero, most) = (F32x8::ZERO, weights[0].max(weights[1]).max(weights[2]));
-            let least = weights[0].min(weights[1]).min(weights[2]);
-            let next = weights[0] + weights[1] + weights[2] - most - least;
-            let mix = ((next - most * F32x8::splat(0.85))
-                / (most * F32x8::splat(0.3)).max(F32x8::splat(1e-20)))
-            .max(zero)
-            .min(F32x8::splat(0.5));
-            let is_first = [weights[0].at_least(most), weights[1].at_least(most), weights[2].at_least(most)];
-            let is_last =
-                [least.at_least(weights[0]), least.at_least(weights[1]), least.at_least(weights[2])];
-            let mut first = [Mask8::NONE; 3];
-            let mut second = [Mask8::NONE; 3];
-            first[0] = is_first[0];
-            first[1] = is_first[1] & !first[0];
-            first[2] = !(first[0] | first[1]);
-            for axis in 0..3 {
-                second[axis] = !first[axis] & !is_last[axis];
-            }
-            let planes = [(p.z, -p.y), (p.x, p.z), (p.x, -p.y)];
-            let mixes = mix.above(zero).any();
-            for (chosen, share, needed) in [(first, F32x8::splat(1.0) - mix, true), (second, mix, mixes)] {
-                if !needed {
-                    continue;
-                }
-                let pick = |a: F32x8, b: F32x8, c: F32x8| chosen[0].pick(a, chosen[1].pick(b, c));
-                let u = pick(planes[0].0, planes[1].0, planes[2].0);
-                let v = pick(planes[0].1, planes[1].1, planes[2].1);
-                covered = covered + hatching.ink(u, v, texels, darkness) * share;
-            }
-        }
-        for lane in lanes {
-            ink.0[lane] = covered.0[lane];
-        }
-    }
-}
-
+/// Returns by how much numbers change to the row before or after, whichever is less.
 #[inline(always)]
-fn turned(by: &Mat3, v: Vec3x8) -> Vec3x8 {
-    Vec3x8::splat(by.x_axis).scaled(v.x)
-        + Vec3x8::splat(by.y_axis).scaled(v.y)
-        + Vec3x8::splat(by.z_axis).scaled(v.z)
-}
-
-/// Raises cosines to their exponents: all at once where these are one whole number, which they mostly are.
-#[inline(always)]
-fn powers(cosine: F32x8, shininess: &[f32; LANES]) -> F32x8 {
-    let exponent = shininess[0];
-    let is_whole = exponent.fract() == 0.0 && (1.0..=65536.0).contains(&exponent);
-    if !(is_whole && shininess.iter().all(|&s| s == exponent)) {
-        let mut all = cosine;
-        for (power, &exponent) in all.0.iter_mut().zip(shininess) {
-            *power = highlight(*power, exponent);
-        }
-        return all;
-    }
-    let (mut power, mut result, mut left) = (cosine, F32x8::splat(1.0), exponent as u32);
-    while left > 0 {
-        if left & 1 == 1 {
-            result = result * power;
-        }
-        power = power * power;
-        left >>= 1;
-    }
-    result
+fn steepness(here: F32x8, all: &[f32], before: usize, after: usize) -> F32x8 {
+    let (before, after) = (F32x8::load(&all[before..]), F32x8::load(&all[after..]));
+    (here - before).abs().min((after - here).abs())
 }

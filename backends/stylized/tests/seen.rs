@@ -201,3 +201,43 @@ fn a_body_within_a_pixel_is_a_dot_as_wide_as_its_line() {
     // A disk of three pixels, and a little for the body itself.
     assert!((5.0..14.0).contains(&ink), "{ink} pixels of ink");
 }
+
+#[test]
+fn any_values_that_are_allowed_give_a_picture() {
+    use polyptych_core::seam::{ParameterKind, Value};
+    let scene = still_life();
+    let mut state = 7u64;
+    let mut below = |n: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % n
+    };
+    let declared = polyptych_stylized::Stylized::new(common::registry()).info().parameters.clone();
+    for round in 0..40 {
+        let mut set: Vec<(&str, String)> = Vec::new();
+        for parameter in declared.iter().filter(|p| p.name != "visibility" || round % 8 == 0) {
+            if below(2) == 0 {
+                continue;
+            }
+            let value = match (parameter.kind, &parameter.default) {
+                (ParameterKind::Bool, _) => (below(2) == 0).to_string(),
+                (ParameterKind::Int { min, max }, _) => {
+                    (min + below((max - min + 1) as u64) as i64).to_string()
+                }
+                (ParameterKind::Float { min, max }, _) => {
+                    (min + (max - min) * below(101) as f64 / 100.0).to_string()
+                }
+                (ParameterKind::Choice { choices }, _) => {
+                    choices[below(choices.len() as u64) as usize].to_owned()
+                }
+                (ParameterKind::Color, _) => format!("#{:06x}", below(1 << 24)),
+                (_, Value::Text(text)) => text.clone(),
+                (_, other) => other.to_string(),
+            };
+            set.push((parameter.name, value));
+        }
+        let settings: Vec<(&str, &str)> = set.iter().map(|(n, v)| (*n, v.as_str())).collect();
+        let camera = central(DVec3::new(0.8, 1.6, 4.6), 0.7);
+        let picture = Easel::with_channels(&scene, camera, [43, 29], &settings, Channels::ALL).picture();
+        assert_eq!(picture.count_not_finite(), 0, "{settings:?}");
+    }
+}

@@ -209,7 +209,10 @@ fn texture_coordinates_and_pictures_of_strokes_are_taken() {
 #[test]
 fn pictures_that_are_none_are_refused_in_one_line() {
     let scene = scene(vec![(Shape::Primitive(Primitive::Sphere { radius: 1.0 }), DVec3::ZERO)], DVec3::Y);
-    for (images, says) in [("", "name 1 to 64 pictures"), ("/nowhere/a.png", "/nowhere/a.png: ")] {
+    let many = "a.png,".repeat(65);
+    for (images, says) in
+        [(many.as_str(), "name at most 64 pictures"), ("/nowhere/a.png", "/nowhere/a.png: ")]
+    {
         let mut renderer = Stylized::new(common::registry());
         let mut need = Need::new(central(DVec3::Z * 3.0, 0.7), 8, 8);
         let declared = renderer.info().parameters.clone();
