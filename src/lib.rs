@@ -28,10 +28,12 @@ pub mod picture;
 pub mod plugins;
 pub mod report;
 pub mod stability;
+pub mod vector;
 
 mod registry;
 mod studio;
 
+pub use polyptych_stylized as stylized;
 pub use registry::BuiltinBackends;
 pub use studio::{Drawing, Studio, StudioError};
 

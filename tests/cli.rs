@@ -113,6 +113,9 @@ fn bench_plan_backends_and_render_print_their_fields() {
     ];
     assert_fields(&bench[0], &fields);
     assert_eq!(bench[0]["frames"], 3);
+    let (count, rate) = (&bench[0]["counters"]["triangles"], &bench[0]["per_second"]["triangles"]);
+    let expected = count.as_f64().unwrap() * 1e3 / bench[0]["ms_median"].as_f64().unwrap();
+    assert!(expected > 0.0 && (rate.as_f64().unwrap() / expected - 1.0).abs() < 1e-9);
 
     let plan = json(&polyptych(&["plan", "builtin:quadrics", "--json"]));
     assert_eq!(plan.as_array().map(Vec::len), Some(5));

@@ -302,6 +302,27 @@ impl Framebuffer {
         &self.coverage
     }
 
+    /// Exchanges planes with another picture of the same size: each of the channels that both have. What is lent is
+    /// exchanged with its memory, so lending twice brings every plane back to where it was.
+    ///
+    /// # Panics
+    /// When the sizes differ.
+    pub fn exchange(&mut self, other: &mut Self, channels: Channels) {
+        use std::mem::swap;
+        assert_eq!((self.width, self.height), (other.width, other.height), "pictures of one size");
+        for channel in channels.iter().filter(|&c| self.channels.has(c) && other.channels.has(c)) {
+            match channel {
+                Channel::Color => swap(&mut self.color, &mut other.color),
+                Channel::Distance => swap(&mut self.distance, &mut other.distance),
+                Channel::Normal => swap(&mut self.normal, &mut other.normal),
+                Channel::Id => swap(&mut self.id, &mut other.id),
+                Channel::Albedo => swap(&mut self.albedo, &mut other.albedo),
+                Channel::Shadow => swap(&mut self.shadow, &mut other.shadow),
+                Channel::Coverage => swap(&mut self.coverage, &mut other.coverage),
+            }
+        }
+    }
+
     /// Returns the bytes held.
     #[must_use]
     pub fn bytes(&self) -> u64 {

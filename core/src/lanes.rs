@@ -462,6 +462,15 @@ impl Vec3x8 {
     }
 }
 
+impl Vec3x8 {
+    /// Widens to double precision.
+    #[must_use]
+    #[inline(always)]
+    pub fn to_f64(self) -> DVec3x8 {
+        DVec3x8 { x: self.x.to_f64(), y: self.y.to_f64(), z: self.z.to_f64() }
+    }
+}
+
 impl DVec3x8 {
     /// Takes `yes` where the mask is set, else `no`.
     #[must_use]
@@ -471,6 +480,17 @@ impl DVec3x8 {
             x: F64x8::pick(mask, yes.x, no.x),
             y: F64x8::pick(mask, yes.y, no.y),
             z: F64x8::pick(mask, yes.z, no.z),
+        }
+    }
+
+    /// Returns the cross products.
+    #[must_use]
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - self.z * other.y,
+            y: self.z * other.x - self.x * other.z,
+            z: self.x * other.y - self.y * other.x,
         }
     }
 
@@ -519,7 +539,10 @@ mod tests {
         let turn = glam::DMat3::from_rotation_z(0.3);
         let turned = DVec3x8::splat(glam::DVec3::new(1.0, 2.0, 3.0)).turned(&turn);
         assert_eq!(turned.get(5), turn * glam::DVec3::new(1.0, 2.0, 3.0));
+        let (a, b) = (glam::DVec3::new(1.0, 2.0, 3.0), glam::DVec3::new(-4.0, 0.5, 7.0));
+        assert_eq!(DVec3x8::splat(a).cross(DVec3x8::splat(b)).get(2), a.cross(b));
         let v = Vec3x8::splat(glam::Vec3::new(2.0, 3.0, 6.0));
+        assert_eq!(v.to_f64().get(7), glam::DVec3::new(2.0, 3.0, 6.0));
         assert_eq!(v.length(), F32x8::splat(7.0));
     }
 }

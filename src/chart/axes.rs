@@ -55,7 +55,7 @@ fn of_parameter(parameter: &Parameter, ruler_samples: u32) -> QualityAxis {
     let values = match parameter.kind {
         ParameterKind::Bool => vec![Value::Bool(false), Value::Bool(true)],
         ParameterKind::Choice { choices } => choices.iter().map(|c| Value::Text((*c).to_owned())).collect(),
-        ParameterKind::Color => Vec::new(),
+        ParameterKind::Color | ParameterKind::Text => Vec::new(),
         ParameterKind::Int { min, max } => {
             // A ruler of n samples has an error of its own: only a quarter as many are held against it.
             let max = if parameter.tag == "samples" { max.min(i64::from(ruler_samples) / 4) } else { max };

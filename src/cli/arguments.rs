@@ -55,7 +55,7 @@ pub(super) struct RenderArguments {
     pub(super) scene: SceneArguments,
     #[command(flatten)]
     pub(super) draw: DrawArguments,
-    /// File to write: .png, .jpg, .exr or .pfm; `-` draws in the terminal.
+    /// File to write: .png, .jpg, .exr or .pfm; .svg for the lines of `stylized`; `-` draws in the terminal.
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: PathBuf,
     /// Channel to write.

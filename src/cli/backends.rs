@@ -59,6 +59,7 @@ fn allowed(parameter: &Parameter) -> String {
         ParameterKind::Float { min, max } => format!("{min} to {max}"),
         ParameterKind::Choice { choices } => choices.join(", "),
         ParameterKind::Color => "#rrggbb".to_owned(),
+        ParameterKind::Text => "text".to_owned(),
     }
 }
 
@@ -83,6 +84,7 @@ fn parameter_json(p: &Parameter) -> Value {
         ParameterKind::Float { min, max } => ("float", json!(min), json!(max), Value::Null),
         ParameterKind::Choice { choices } => ("choice", Value::Null, Value::Null, json!(choices)),
         ParameterKind::Color => ("color", Value::Null, Value::Null, Value::Null),
+        ParameterKind::Text => ("text", Value::Null, Value::Null, Value::Null),
     };
     json!({
         "name": p.name, "type": kind, "default": p.default, "min": min, "max": max, "choices": choices,

@@ -46,13 +46,17 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
             .iter()
             .map(|(name, time)| (name.to_owned(), json!(time.as_secs_f64() * 1e3)))
             .collect();
-        let counters: serde_json::Map<String, Value> =
-            last.counters.iter().flatten().map(|c| (c.name.to_owned(), json!(c.count))).collect();
+        let each = |of: &dyn Fn(u64) -> Value| -> serde_json::Map<String, Value> {
+            last.counters.iter().flatten().map(|c| (c.name.to_owned(), of(c.count))).collect()
+        };
+        let counters = each(&|count| json!(count));
+        let per_second = each(&|count| json!(count as f64 * 1e3 / at(0.5)));
         rows.push(json!({
             "backend": backend, "scene": scene.name, "width": need.width, "height": need.height,
             "threads": threads, "prepare_ms": prepare_ms, "frames": times.len(),
             "ms_median": at(0.5), "ms_min": at(0.0), "ms_p95": at(0.95),
-            "bytes": prepared.bytes, "settings": need.settings, "phases": phases, "counters": counters, "auto": choice,
+            "bytes": prepared.bytes, "settings": need.settings, "phases": phases, "counters": counters,
+            "per_second": per_second, "auto": choice,
         }));
     }
     if arguments.draw.json {
@@ -89,6 +93,13 @@ fn table(rows: &[Value]) -> String {
             number("ms_p95"),
             row["bytes"]
         ));
+        for (name, rate) in row["per_second"].as_object().into_iter().flatten() {
+            let rate = rate.as_f64().unwrap_or(0.0) * 1e-6;
+            text.push_str(&format!(
+                "{:<12} {} {name}, {rate:.2} million a second\n",
+                "", row["counters"][name]
+            ));
+        }
     }
     text
 }

@@ -2,11 +2,14 @@
 
 use super::arguments::RenderArguments;
 use super::{Failure, auto, input, print};
-use polyptych::framebuffer::Channels;
-use polyptych::picture;
+use polyptych::framebuffer::{Channel, Channels};
 use polyptych::report::count_decisions;
+use polyptych::scene::Scene;
 use polyptych::seam::Need;
+use polyptych::{Studio, picture, vector};
 use serde_json::json;
+use std::sync::Arc;
+use std::time::Instant;
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let scene = input::scene(&arguments.scene)?;
@@ -28,6 +31,9 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
         tolerance_px: choice.as_ref().map_or(base.tolerance_px, |c| c.chosen.tolerance_px),
         ..base
     };
+    if arguments.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg")) {
+        return lines(arguments, backend, &studio, &scene, &need);
+    }
     let drawing = studio.draw(backend, &scene, &need).map_err(Failure::running)?;
     if arguments.output.as_os_str() == "-" {
         print(&picture::terminal(&drawing.framebuffer, arguments.channel, 96));
@@ -59,6 +65,37 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
         for (object, decision) in scene.objects.iter().zip(drawing.prepared.objects.iter()) {
             eprintln!("{}: {} {}", object.name, decision.word(), decision.why());
         }
+    }
+    Ok(())
+}
+
+/// Draws the contours into a file of vectors.
+fn lines(
+    arguments: &RenderArguments,
+    backend: &str,
+    studio: &Studio,
+    scene: &Arc<Scene>,
+    need: &Need,
+) -> Result<(), Failure> {
+    let file = arguments.output.display();
+    if backend != "stylized" || arguments.channel != Channel::Color {
+        return Err(Failure::wrong_use(format!(
+            "{file}: lines are drawn by `--backend stylized` as color alone"
+        )));
+    }
+    let begin = Instant::now();
+    let svg = vector::lines_as_svg(studio, scene, need).map_err(Failure::running)?;
+    let time = begin.elapsed().as_secs_f64() * 1e3;
+    picture::write_whole(&arguments.output, svg.as_bytes())
+        .map_err(|error| Failure::running(format!("{file}: {error}")))?;
+    if arguments.draw.json {
+        let result = json!({
+            "backend": backend, "width": need.width, "height": need.height, "frame_ms": time, "bytes": svg.len(),
+            "out": arguments.output.to_string_lossy(),
+        });
+        print(&format!("{result}\n"));
+    } else if !arguments.draw.quiet {
+        print(&format!("{file}: {backend}, {}x{}, drawn in {time:.1} ms\n", need.width, need.height));
     }
     Ok(())
 }

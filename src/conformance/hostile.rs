@@ -96,6 +96,8 @@ fn any_value(parameter: &Parameter, random: &mut Random) -> String {
         }
         ParameterKind::Choice { choices } => choices[random.below(choices.len())].to_owned(),
         ParameterKind::Color => format!("#{:06x}", random.below(1 << 24)),
+        // What a line of text names need not be there; what is there by default is.
+        ParameterKind::Text => parameter.default.to_string(),
     }
 }
 

@@ -61,6 +61,11 @@ fn field(ui: &mut egui::Ui, parameter: &Parameter, current: &Value, label: egui:
             let changed = ui.color_edit_button_srgba(&mut color).labelled_by(label).changed();
             changed.then(|| format!("#{:02x}{:02x}{:02x}", color.r(), color.g(), color.b()))
         }
+        (ParameterKind::Text, Value::Text(value)) => {
+            let mut text = value.clone();
+            let field = egui::TextEdit::singleline(&mut text).desired_width(140.0);
+            ui.add(field).labelled_by(label).changed().then_some(text)
+        }
         // A default of another type than declared is a bug of the back end: shown, not edited.
         _ => {
             ui.label(current.to_string());

@@ -1,12 +1,13 @@
 //! How are visible pixels resolved? Eight at once: where their rays meet the triangles seen, and what is there.
 //!
-//! Eight pixels in a row that show one triangle, as most do where triangles are large, are met in lanes. Others are
-//! met one by one and go on in lanes from there. Both give the same bytes.
+//! Eight pixels in a row that show one triangle, as most do where triangles are large, meet a [`Face`] that was set up
+//! for all of them. Others meet a triangle each.
 
-use crate::face::{Face, Place};
+use crate::face::{Face, Met, Place};
 use crate::info::Shading;
 use crate::lens::Lens;
 use crate::model::Model;
+use crate::octet::{Names, Octet};
 use glam::{DVec3, Vec3};
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, I32x8, LANES, Vec3x8};
 use polyptych_core::scene::{Material, Scene};
@@ -14,12 +15,15 @@ use polyptych_core::scene::{Material, Scene};
 /// Places of the picture with the triangle seen there, and what resolving and lighting found out.
 pub(crate) struct Batch<'a> {
     pub(crate) count: usize,
-    /// Whether all places are filled and show one triangle.
-    pub(crate) is_one: bool,
+    /// Whether all places are filled and show one triangle, which has a face.
+    is_one: bool,
+    /// Whether all that are filled have the first one's material.
+    pub(crate) has_one_material: bool,
     /// Place in the picture.
     x: F64x8,
     y: F64x8,
-    /// Index of the triangle in the tile's table.
+    pub(crate) names: Names,
+    /// Index of the triangle in the tile's table, or [`NO_FACE`].
     pub(crate) face: [u16; LANES],
     /// What the painter needs to know to put the sample where it belongs.
     pub(crate) tag: [u32; LANES],
@@ -46,6 +50,9 @@ pub(crate) struct Batch<'a> {
     pub(crate) shadow: F32x8,
 }
 
+/// The index of triangles that need no face.
+pub(crate) const NO_FACE: u16 = u16::MAX;
+
 /// What is asked of a point beyond its place and normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ask {
@@ -61,9 +68,11 @@ impl Batch<'_> {
         Self {
             count: 0,
             is_one: false,
+            has_one_material: false,
             x: F64x8::splat(0.0),
             y: F64x8::splat(0.0),
-            face: [0; LANES],
+            names: Names { id: [0; LANES], part: [0; LANES], triangle: [0; LANES] },
+            face: [NO_FACE; LANES],
             tag: [0; LANES],
             t: one,
             weights: [F32x8::ZERO; 2],
@@ -80,21 +89,30 @@ impl Batch<'_> {
         }
     }
 
+    /// Adds a place; the name is id, part and triangle.
     #[inline(always)]
-    pub(crate) fn push(&mut self, x: f64, y: f64, face: u16, tag: u32) {
-        let i = self.count;
+    pub(crate) fn push(&mut self, (x, y): (f64, f64), [id, part, triangle]: [u32; 3], face: u16, tag: u32) {
+        let (i, names) = (self.count, &mut self.names);
         (self.x.0[i], self.y.0[i], self.face[i], self.tag[i]) = (x, y, face, tag);
+        (names.id[i], names.part[i], names.triangle[i]) = (id, part, triangle);
         self.count += 1;
     }
 
     /// Fills an empty batch with pixels of a row that show one triangle; `x` and `y` are the first one's center.
     #[inline(always)]
-    pub(crate) fn fill(&mut self, x: f64, y: f64, face: u16, tag: u32) {
+    pub(crate) fn fill(&mut self, (x, y): (f64, f64), [id, part, triangle]: [u32; 3], face: u16, tag: u32) {
         (self.count, self.is_one) = (LANES, true);
         self.x = F64x8::splat(x) + I32x8::count_from(0).to_f64();
         self.y = F64x8::splat(y);
         self.face = [face; LANES];
+        self.names = Names { id: [id; LANES], part: [part; LANES], triangle: [triangle; LANES] };
         self.tag = std::array::from_fn(|lane| tag + lane as u32);
+    }
+
+    /// Returns the part that the last place showed: the next one likely shows it, too.
+    #[inline(always)]
+    pub(crate) fn last_part(&self) -> usize {
+        self.names.part[self.count.saturating_sub(1)] as usize
     }
 
     #[inline(always)]
@@ -118,45 +136,80 @@ impl<'a> Batch<'a> {
         faces: &[Face],
         (ask, shading): (Ask, Shading),
     ) {
-        if self.is_one {
-            let face = &faces[usize::from(self.face[0])];
-            if let Some(met) = face.meet_all(lens, self.x, self.y) {
-                self.t = met.t;
-                self.weights = met.weights;
-                let side = if met.from_within { -1.0 } else { 1.0 };
-                let outward = face.outward * side;
-                self.true_normal = DVec3x8::splat(outward);
-                self.normal = if shading == Shading::Flat {
-                    Vec3x8::splat(outward.as_vec3())
-                } else {
-                    face.normals_of(&met).scaled(F32x8::splat(side as f32))
-                };
-                let material = face.material(scene, model);
-                self.material = [Some(material); LANES];
-                if ask == Ask::Color {
-                    if face.is_painted {
-                        for i in 0..LANES {
-                            let place = Place { scene, model, lens, x: self.x.0[i], y: self.y.0[i] };
-                            let (color, opacity) = face.color(&place, &met.of(i));
-                            self.opacity[i] = opacity;
-                            self.color.set(i, color);
-                        }
-                    } else {
-                        self.opacity = [material.effective_opacity(material.opacity).min(1.0); LANES];
-                        self.color = Vec3x8::splat(material.base_color);
-                    }
+        if !(self.is_one && self.resolve_one(scene, model, lens, faces, (ask, shading))) {
+            self.resolve_each(scene, model, lens, faces, (ask, shading));
+        }
+        self.straighten();
+    }
+
+    /// Finds the points of pixels that show one triangle; false if a ray passes beside it.
+    #[inline(always)]
+    fn resolve_one(
+        &mut self,
+        scene: &'a Scene,
+        model: &Model,
+        lens: &Lens,
+        faces: &[Face],
+        (ask, shading): (Ask, Shading),
+    ) -> bool {
+        let face = &faces[usize::from(self.face[0])];
+        let Some(met) = face.meet_all(lens, self.x, self.y) else { return false };
+        self.t = met.t;
+        self.weights = met.weights;
+        let side = if met.from_within { -1.0 } else { 1.0 };
+        let outward = face.outward * side;
+        self.true_normal = DVec3x8::splat(outward);
+        self.normal = if shading == Shading::Flat {
+            Vec3x8::splat(outward.as_vec3())
+        } else {
+            face.normals_of(&met).scaled(F32x8::splat(side as f32))
+        };
+        let material = face.material(scene, model);
+        self.material = [Some(material); LANES];
+        self.has_one_material = true;
+        if ask == Ask::Color {
+            if face.is_painted {
+                for i in 0..LANES {
+                    let place = Place { scene, model, lens, x: self.x.0[i], y: self.y.0[i] };
+                    let (color, opacity) = face.color(&place, &met.of(i));
+                    self.opacity[i] = opacity;
+                    self.color.set(i, color);
                 }
-                self.reach(lens);
-                self.straighten();
-                return;
+            } else {
+                self.opacity = [material.effective_opacity(material.opacity).min(1.0); LANES];
+                self.color = Vec3x8::splat(material.base_color);
             }
         }
+        self.reach(lens);
+        true
+    }
+
+    /// Finds the points of pixels that show a triangle each.
+    #[inline(always)]
+    fn resolve_each(
+        &mut self,
+        scene: &'a Scene,
+        model: &Model,
+        lens: &Lens,
+        faces: &[Face],
+        (ask, shading): (Ask, Shading),
+    ) {
+        let octet = Octet::of(model, lens.origin, &self.names, self.count, shading != Shading::Flat);
+        let met = octet.meet(lens, self.x, self.y);
+        self.t = met.t;
+        self.weights = [met.weights[0].round(), met.weights[1].round()];
+        (self.true_normal, self.normal) = (met.true_normal, met.normal);
+        let (mut from_within, mut weights) = (met.from_within, met.weights);
         let (mut held, mut any_held) = ([DVec3::NAN; LANES], false);
-        for i in 0..self.count {
-            let (face, x, y) = (&faces[usize::from(self.face[i])], self.x.0[i], self.y.0[i]);
-            let met = face.meet(lens, x, y);
+        for i in (0..self.count).filter(|&i| !met.inside.has(i)) {
+            // The ray passes beside its triangle: rare, and held to it one by one.
+            let face = Face::new(scene, model, lens, self.names.id[i]);
+            let met = face.meet(lens, self.x.0[i], self.y.0[i]);
             self.t.0[i] = met.t;
-            (self.weights[0].0[i], self.weights[1].0[i]) = (met.weights[1] as f32, met.weights[2] as f32);
+            for k in 0..2 {
+                weights[k].0[i] = met.weights[k + 1];
+                self.weights[k].0[i] = met.weights[k + 1] as f32;
+            }
             if let Some(place) = met.held {
                 (held[i], any_held) = (place, true);
             }
@@ -165,9 +218,27 @@ impl<'a> Batch<'a> {
             let (normal, outward) = if met.from_within { (-normal, -outward) } else { (normal, outward) };
             self.normal.set(i, normal);
             self.true_normal.set(i, outward);
-            self.material[i] = Some(face.material(scene, model));
-            if ask == Ask::Color {
-                let (color, opacity) = face.color(&Place { scene, model, lens, x, y }, &met);
+            from_within.0[i] = if met.from_within { u32::MAX } else { 0 };
+        }
+        self.find_materials(scene, model);
+        if ask == Ask::Color {
+            for i in 0..self.count {
+                let Some(material) = self.material[i] else { continue };
+                let (color, opacity) = match faces.get(usize::from(self.face[i])) {
+                    Some(face) => {
+                        let [v, w] = weights.map(|w| w.0[i]);
+                        let weights = [1.0 - v - w, v, w];
+                        let (t, held) = (self.t.0[i], held[i].is_finite().then_some(held[i]));
+                        let place = Place { scene, model, lens, x: self.x.0[i], y: self.y.0[i] };
+                        face.color(&place, &Met { t, weights, from_within: from_within.has(i), held })
+                    }
+                    None => {
+                        let (part, triangle) = (self.names.part[i] as usize, self.names.triangle[i] as usize);
+                        let weights = [self.weights[0].0[i], self.weights[1].0[i]];
+                        let color = model.parts[part].tinted(material.base_color, triangle, weights);
+                        (color, material.effective_opacity(material.opacity).min(1.0))
+                    }
+                };
                 self.opacity[i] = opacity;
                 self.color.set(i, color);
             }
@@ -178,7 +249,24 @@ impl<'a> Batch<'a> {
                 self.place.set(i, held[i]);
             }
         }
-        self.straighten();
+    }
+
+    /// Finds the material of each place.
+    #[inline(always)]
+    fn find_materials(&mut self, scene: &'a Scene, model: &Model) {
+        self.has_one_material = true;
+        for i in 0..self.count {
+            let part = &model.parts[self.names.part[i] as usize];
+            let same = i > 0 && self.names.part[i] == self.names.part[i - 1] && part.has_one_slot();
+            self.material[i] = if same {
+                self.material[i - 1]
+            } else {
+                let slot = part.mesh().slot(self.names.triangle[i] as usize);
+                Some(scene.material(&scene.objects[part.object], slot))
+            };
+            let (first, this) = (self.material[0], self.material[i]);
+            self.has_one_material &= first.zip(this).is_some_and(|(a, b)| std::ptr::eq(a, b));
+        }
     }
 
     /// Goes along all rays: places, distances, directions to the eye.

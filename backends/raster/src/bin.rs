@@ -163,11 +163,12 @@ impl Run {
             if any & border::CLIPPING == 0 {
                 let point = |v: &ScreenVertex| ScreenPoint { x: v.x, y: v.y, depth: v.depth };
                 let points = [point(a), point(b), point(c)];
-                records.extend(Record::new(&points, DepthPlane::through(&points), id, sides, reach));
+                let plane = || DepthPlane::through(&points);
+                records.extend(Record::new(&points, plane, id, sides, reach));
             } else {
                 let corners = mesh.corners(triangle).map(|p| screen_from_object.apply(p.as_dvec3()));
                 clip(pass.lens, corners, |points, plane| {
-                    records.extend(Record::new(&points, plane, id, sides, reach));
+                    records.extend(Record::new(&points, || plane, id, sides, reach));
                 });
             }
         }

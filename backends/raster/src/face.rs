@@ -30,10 +30,9 @@ pub(crate) struct Face {
     normals: [Vec3; 3],
     origin: DVec3,
     edges: [DVec3; 2],
-    pub(crate) id: u32,
     /// Index of its part, and the triangle's in it.
     pub(crate) part: u32,
-    triangle: u32,
+    pub(crate) triangle: u32,
     is_mirrored: bool,
     /// Whether color or opacity change over the triangle.
     pub(crate) is_painted: bool,
@@ -103,7 +102,6 @@ impl Face {
             normals: shading_normals(part, mesh, corners, outward),
             origin: a,
             edges,
-            id,
             part: index as u32,
             triangle: triangle as u32,
             is_mirrored: part.mirrored,
@@ -227,13 +225,8 @@ impl Face {
                 at.scene.base_color(material, uv.map(|v| v.to_array()), position, normal, lod)
             }
         };
-        let tint = if mesh.colors.is_empty() {
-            Vec3::ONE
-        } else {
-            let w = weights.map(|w| w as f32);
-            mesh.colors[a] * w[0] + mesh.colors[b] * w[1] + mesh.colors[c] * w[2]
-        };
-        (base * tint, material.effective_opacity(opacity).min(1.0))
+        let tinted = part.tinted(base, self.triangle as usize, [weights[1] as f32, weights[2] as f32]);
+        (tinted, material.effective_opacity(opacity).min(1.0))
     }
 
     /// Returns the mip level at which a texel is as large as the pixel, from the exact change of the point over

@@ -13,8 +13,10 @@
 //!  tile       spans of covered pixels; nearest triangle of each: the visibility buffer
 //!  layers     fragments of see-through triangles, sorted per pixel
 //!  face       a visible triangle set up once a tile: where rays meet it, normals, texture with its mip level
-//!  batch      32 visible pixels at once: distances, places, unit normals
+//!  octet      the same in lanes for pixels that show a triangle each
+//!  batch      eight visible pixels at once: distances, places, unit normals
 //!  light      the lighting equation of the core over a batch, with shadows
+//!  lookup     what stands between eight points and a light
 //!  smooth     edges: triangles that share a pixel, by several places in it
 //!  paint      the steps of a tile, and the pixel's channels
 //!  lines      edges of faces, and free segments                   (prepare, for modes that draw them)
@@ -50,7 +52,9 @@ mod layers;
 mod lens;
 mod light;
 mod lines;
+mod lookup;
 mod model;
+mod octet;
 mod paint;
 mod plan;
 mod renderer;
@@ -62,5 +66,6 @@ mod strokes;
 mod tests;
 mod tile;
 mod transform;
+mod wide;
 
 pub use renderer::{Factory, Raster};

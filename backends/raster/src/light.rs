@@ -1,12 +1,12 @@
 //! How much light leaves a point towards the eye, and how many lights reach it?
 
 use crate::batch::Batch;
-use crate::face::Face;
 use crate::gouraud::Gouraud;
+use crate::lookup::Sights;
 use crate::model::Model;
-use crate::shadow::{Looks, Shadows, Sight};
+use crate::shadow::Shadows;
 use glam::{DAffine3, DVec3, Vec3};
-use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{Arriving, Light, LightKind, LightingModel, Material, Scene, Shape};
 use polyptych_core::shade::{Surfaces, lit_by_material};
@@ -88,20 +88,18 @@ pub(crate) struct Illumination<'a> {
 }
 
 impl Illumination<'_> {
-    /// Lights all samples of a batch; `faces` are those that it names, and `corners` the light at their corners if
-    /// that is to be interpolated.
+    /// Lights all samples of a batch; `corners` is the light at the corners of its faces if that is to be interpolated.
     #[inline(always)]
     pub(crate) fn light(
         &self,
         batch: &mut Batch<'_>,
-        faces: &[Face],
         corners: Option<&Gouraud>,
         origin: DVec3,
         wants: Wants,
     ) {
         self.fill_ambient(batch, wants);
         let used = Mask8::first(batch.count);
-        let taking = self.taking_shadow(batch, faces) & used;
+        let taking = self.taking_shadow(batch) & used;
         let (mut casting, mut reaching, one) = (F32x8::ZERO, F32x8::ZERO, F32x8::splat(1.0));
         for (index, lamp) in self.lamps.iter().enumerate() {
             let arrivals = Arrivals::of(lamp, batch, origin);
@@ -118,15 +116,13 @@ impl Illumination<'_> {
             let crosses = if casts { arrives & taking } else { Mask8::NONE };
             if let Some(shadows) = self.shadows.filter(|_| crosses.any()) {
                 let looks = shadows.look(index, batch.place, origin, crosses);
-                for i in (0..batch.count).filter(|&i| crosses.has(i)) {
-                    let triangle = faces[usize::from(batch.face[i])].id;
-                    let place = || (batch.place.get(i), origin);
-                    if looks.see_more_than(i, triangle)
-                        && self.is_blocked(shadows, &looks, i, place(), triangle, &arrivals)
-                    {
-                        arrives.0[i] = 0;
-                    }
-                }
+                let sights = Sights {
+                    place: batch.place + DVec3x8::splat(origin - shadows.origin),
+                    triangle: batch.names.id,
+                    to_light: arrivals.to_light,
+                    distance: arrivals.distance,
+                };
+                arrives = arrives & !shadows.blocked((self.scene, self.model), &looks, &sights, crosses);
             }
             batch.lit = Vec3x8::pick(arrives, batch.lit + added, batch.lit);
             if casts {
@@ -140,16 +136,12 @@ impl Illumination<'_> {
 
     /// Tells on which samples light can be blocked on its way.
     #[inline(always)]
-    fn taking_shadow(&self, batch: &Batch<'_>, faces: &[Face]) -> Mask8 {
-        let takes = |face: u16| {
-            let takes = self.model.parts[faces[usize::from(face)].part as usize].takes_shadow;
-            if takes { u32::MAX } else { 0 }
-        };
-        if batch.is_one {
-            return Mask8([takes(batch.face[0]); LANES]);
-        }
+    fn taking_shadow(&self, batch: &Batch<'_>) -> Mask8 {
         let mut mask = Mask8::NONE;
-        (0..batch.count).for_each(|i| mask.0[i] = takes(batch.face[i]));
+        for i in 0..batch.count {
+            let takes = self.model.parts[batch.names.part[i] as usize].takes_shadow;
+            mask.0[i] = if takes { u32::MAX } else { 0 };
+        }
         mask
     }
 
@@ -158,7 +150,7 @@ impl Illumination<'_> {
         let ambient = self.scene.environment.ambient;
         let light = |material: &Material, color: Vec3| material.emission + ambient * color * material.ambient;
         batch.lit = Vec3x8::splat(Vec3::ZERO);
-        if batch.is_one && wants.color {
+        if batch.has_one_material && wants.color {
             let Some(material) = batch.material[0] else { return };
             let share = Vec3x8::splat(ambient) * batch.color * Vec3x8::splat(Vec3::splat(material.ambient));
             batch.lit = Vec3x8::splat(material.emission) + share;
@@ -175,7 +167,7 @@ impl Illumination<'_> {
     #[inline(always)]
     fn added(&self, batch: &Batch<'_>, arrivals: &Arrivals) -> Vec3x8 {
         let Batch { color, normal, to_eye, .. } = *batch;
-        if let (true, Some(material)) = (batch.is_one, batch.material[0]) {
+        if let (true, Some(material)) = (batch.has_one_material, batch.material[0]) {
             let surfaces = Surfaces { material, color, normal, to_eye };
             return surfaces.lit_by(self.lighting, arrivals.direction, arrivals.radiance);
         }
@@ -193,21 +185,6 @@ impl Illumination<'_> {
             added.set(i, corners.added(of, self.lamps.len(), batch.color.get(i), weights));
         }
         added
-    }
-
-    #[inline(always)]
-    fn is_blocked(
-        &self,
-        shadows: &Shadows,
-        looks: &Looks<'_>,
-        i: usize,
-        (place, origin): (DVec3, DVec3),
-        triangle: u32,
-        arrivals: &Arrivals,
-    ) -> bool {
-        let (place, distance) = (place + (origin - shadows.origin), arrivals.distance.0[i]);
-        let sight = Sight { place, triangle, to_light: arrivals.to_light.get(i), distance };
-        shadows.is_blocked(self.scene, self.model, looks, i, &sight)
     }
 }
 

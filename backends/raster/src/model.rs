@@ -1,7 +1,7 @@
 //! What is drawn: triangle meshes at their places, given or converted.
 
 use crate::setup::Sides;
-use glam::{DAffine3, DMat3, DVec3, Mat3};
+use glam::{DAffine3, DMat3, DVec3, Mat3, Vec3};
 use polyptych_core::convert::MeshModel;
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{AlphaMode, Material, Mesh, Object, Scene, Shape};
@@ -44,6 +44,8 @@ pub(crate) struct Part {
     reach: f64,
     /// How each slot looks to the camera and to lights.
     classes: Vec<[Class; 2]>,
+    /// Whether any slot has a texture.
+    pub(crate) is_textured: bool,
     /// Whether light can be blocked on its way to it.
     pub(crate) takes_shadow: bool,
     /// Whether faces that let light through are seen from outside only: one step into a solid is one surface.
@@ -154,6 +156,8 @@ impl Model {
             bounds,
             reach,
             classes: classes(scene, object),
+            is_textured: (0..object.materials.len().max(1))
+                .any(|slot| scene.material(object, slot).texture.is_some()),
             takes_shadow: !matches!(*object.shape, Shape::Volume(_)),
             one_sided_layers: matches!(*object.shape, Shape::Voxels(_)),
             source,
@@ -193,6 +197,28 @@ impl Part {
     /// Returns how a slot takes part in a pass.
     pub(crate) fn class(&self, role: Role, slot: usize) -> Class {
         self.classes.get(slot).unwrap_or(&self.classes[0])[role as usize]
+    }
+
+    /// Returns what the colors of a triangle's corners make of one, from the weights of the second and third.
+    #[inline(always)]
+    pub(crate) fn tinted(&self, color: Vec3, triangle: usize, [v, w]: [f32; 2]) -> Vec3 {
+        let mesh = self.mesh();
+        if mesh.colors.is_empty() {
+            return color;
+        }
+        let [a, b, c] = mesh.triangles[triangle];
+        let tint = |corner: u32| mesh.colors[corner as usize];
+        color * (tint(a) * (1.0 - v - w) + tint(b) * v + tint(c) * w)
+    }
+
+    /// Tells whether all triangles have one material.
+    pub(crate) fn has_one_slot(&self) -> bool {
+        self.classes.len() == 1
+    }
+
+    /// Tells whether light may pass some of what blocks it.
+    pub(crate) fn has_holes(&self) -> bool {
+        self.classes.iter().any(|of| of[Role::Light as usize] == Class::Layer)
     }
 
     /// Lists how each slot takes part in the passes.

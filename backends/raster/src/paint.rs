@@ -1,6 +1,6 @@
 //! From triangles in tiles to pixels: visibility, then the surfaces that are seen, then their light.
 
-use crate::batch::{Ask, Batch};
+use crate::batch::{Ask, Batch, NO_FACE};
 use crate::bin::Bins;
 use crate::drawing::Drawing;
 use crate::face::Faces;
@@ -128,7 +128,7 @@ impl<'a> Painter<'a> {
 
     fn paint_tile(&self, grid: &TileGrid, tile: usize, band: &mut Band<'_>, scratch: &mut Scratch) -> u64 {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if crate::wide::has_avx2() {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for a processor feature can only be called so"
@@ -162,7 +162,7 @@ impl<'a> Painter<'a> {
         let area = grid.area(tile);
         // 1. Visibility: the nearest solid triangle of each pixel.
         let hides = self.drawing.is_none_or(|drawing| drawing.hides);
-        let buffer = TileBuffer::of_here(self.bins.solid(tile).take_while(|_| hides).copied(), &area);
+        let buffer = TileBuffer::of(self.bins.solid(tile).take_while(|_| hides).copied(), &area);
         // 2. What light may pass through, in front of it. It hides no line.
         scratch.fragments.clear();
         for record in self.bins.layers(tile).take_while(|_| self.drawing.is_none()) {
@@ -279,9 +279,45 @@ impl<'a> Painter<'a> {
         fill(band.coverage, pixels, nothing.coverage);
     }
 
-    /// Finds and lights the surfaces of a batch.
+    /// Returns the index of a triangle in the table of a tile.
     #[inline(always)]
+    fn find(&self, faces: &mut Faces, id: u32) -> u16 {
+        faces.find(self.light.scene, self.light.model, self.lens, id)
+    }
+
+    /// Adds a sample to a batch that is not full. A triangle whose texture or corners' light is to be found gets a face.
+    #[inline(always)]
+    pub(crate) fn add(&self, batch: &mut Batch<'a>, faces: &mut Faces, place: (f64, f64), id: u32, tag: u32) {
+        let model = self.light.model;
+        let part = model.part_near(batch.last_part(), id);
+        let is_painted = model.parts[part].is_textured && (self.ask == Ask::Color || tag & LAYER != 0);
+        let needs_face = is_painted || self.shading == Shading::Gouraud;
+        let face = if needs_face { self.find(faces, id) } else { NO_FACE };
+        batch.push(place, [id, part as u32, id - model.parts[part].first_triangle], face, tag);
+    }
+
+    /// Finds and lights the surfaces of a batch. This is where most time goes: one kernel, called from everywhere.
     pub(crate) fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
+        #[cfg(target_arch = "x86_64")]
+        if crate::wide::has_avx2() {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.light_avx2(batch, faces, corners) };
+        }
+        self.light_here(batch, faces, corners);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn light_avx2(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
+        self.light_here(batch, faces, corners);
+    }
+
+    #[inline(always)]
+    fn light_here(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
         let light = &self.light;
         // Opacity decides what is seen first.
         let layered = batch.tag[..batch.count].iter().any(|tag| tag & LAYER != 0);
@@ -301,7 +337,7 @@ impl<'a> Painter<'a> {
             if interpolated {
                 corners.light(light, self.lens, faces);
             }
-            light.light(batch, &faces.faces, interpolated.then_some(&*corners), self.lens.origin, self.wants);
+            light.light(batch, interpolated.then_some(&*corners), self.lens.origin, self.wants);
         }
         if light.scene.environment.fog.is_some() {
             for i in 0..batch.count {
@@ -382,10 +418,12 @@ impl<'a> TilePainter<'_, 'a, '_> {
         for (octet, ids) in solid.chunks_exact(LANES).enumerate() {
             let first = (octet * LANES) as u32;
             if ids[0] != NO_TRIANGLE && ids.iter().all(|&id| id == ids[0]) {
-                let light = &self.painter.light;
-                let face = self.faces.find(light.scene, light.model, self.painter.lens, ids[0]);
+                let painter = self.painter;
+                let face = painter.find(self.faces, ids[0]);
+                let of = &self.faces.faces[usize::from(face)];
                 let (x, y) = self.place(first);
-                one.fill(f64::from(x) + 0.5, f64::from(y) + 0.5, face, first | LAST);
+                let name = [ids[0], of.part, of.triangle];
+                one.fill((f64::from(x) + 0.5, f64::from(y) + 0.5), name, face, first | LAST);
                 self.finish(&mut one);
                 continue;
             }
@@ -402,10 +440,8 @@ impl<'a> TilePainter<'_, 'a, '_> {
     /// Adds a sample to a batch that is not full.
     #[inline(always)]
     fn add(&mut self, batch: &mut Batch<'a>, id: u32, tag: u32) {
-        let light = &self.painter.light;
-        let face = self.faces.find(light.scene, light.model, self.painter.lens, id);
         let (x, y) = self.place(tag);
-        batch.push(f64::from(x) + 0.5, f64::from(y) + 0.5, face, tag);
+        self.painter.add(batch, self.faces, (f64::from(x) + 0.5, f64::from(y) + 0.5), id, tag);
     }
 
     /// Returns the column and row of a sample in the picture.
@@ -444,8 +480,8 @@ impl<'a> TilePainter<'_, 'a, '_> {
                 index.iter().enumerate().for_each(|(i, &at)| plane[at] = value(i));
             }
         }
-        let (parts, faces) = (&self.painter.light.model.parts, &self.faces.faces);
-        let object = |i: usize| parts[faces[usize::from(batch.face[i])].part as usize].object;
+        let parts = &self.painter.light.model.parts;
+        let object = |i: usize| parts[batch.names.part[i] as usize].object;
         fill(self.band.color, index, |i| finite(batch.lit.get(i)));
         fill(self.band.distance, index, |i| batch.distance.0[i] as f32);
         fill(self.band.normal, index, |i| finite(batch.normal.get(i)));
@@ -486,12 +522,11 @@ impl<'a> TilePainter<'_, 'a, '_> {
 
     /// Returns what the geometry channels hold of the surface seen first.
     fn seen(&self, batch: &Batch<'_>, i: usize) -> Pixel {
-        let face = &self.faces.faces[usize::from(batch.face[i])];
         Pixel {
             color: Vec3::ZERO,
             distance: batch.distance.0[i] as f32,
             normal: finite(batch.normal.get(i)),
-            id: self.painter.light.model.parts[face.part as usize].object as u32 + 1,
+            id: self.painter.light.model.parts[batch.names.part[i] as usize].object as u32 + 1,
             albedo: finite(batch.color.get(i)),
             shadow: batch.shadow.0[i],
             coverage: 1.0,

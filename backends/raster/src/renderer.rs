@@ -213,8 +213,10 @@ impl Renderer for Raster {
         let demand = decide::demand(scene, need, &lamps, options);
         // What stands before a light depends neither on the mode nor on the channels, which may change back.
         let all = Need { channels: need.channels.with(Channel::Color), ..need.clone() };
-        let of_all = decide::demand(scene, &all, &lamps, Options { mode: Mode::Shadowed, ..options });
-        for (lamp, shadow) in lamps.iter_mut().zip(&of_all.shadows) {
+        let is_all = options.mode == Mode::Shadowed && all.channels == need.channels;
+        let of_all = (!is_all)
+            .then(|| decide::demand(scene, &all, &lamps, Options { mode: Mode::Shadowed, ..options }));
+        for (lamp, shadow) in lamps.iter_mut().zip(&of_all.as_ref().unwrap_or(&demand).shadows) {
             lamp.is_blocked = shadow.is_ok();
         }
         let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);

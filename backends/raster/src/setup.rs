@@ -79,6 +79,35 @@ fn last_pixel(v: &[i32; 3]) -> i32 {
     (v[0].max(v[1]).max(v[2]) - STEPS / 2) >> 8
 }
 
+/// Tells whether a triangle of positive area whose box has few pixel centers covers one of them; most triangles that
+/// are smaller than a pixel do not. Yes for larger ones.
+#[inline(always)]
+fn covers_any(x: &[i32; 3], y: &[i32; 3]) -> bool {
+    let (x0, x1, y0, y1) = (first_pixel(x), last_pixel(x), first_pixel(y), last_pixel(y));
+    if (x1 - x0 + 1) * (y1 - y0 + 1) > FEW_PIXELS {
+        return true;
+    }
+    for row in y0..=y1 {
+        for column in x0..=x1 {
+            let (px, py) = ((column << 8) + STEPS / 2, (row << 8) + STEPS / 2);
+            let mut inside = true;
+            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                let (by_column, by_row) = (i64::from(y[a] - y[b]), i64::from(x[b] - x[a]));
+                let is_top_or_left = by_column > 0 || (by_column == 0 && by_row > 0);
+                let value = by_column * i64::from(px - x[a]) + by_row * i64::from(py - y[a]);
+                inside &= value >= i64::from(!is_top_or_left);
+            }
+            if inside {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// Most pixel centers that are tried one by one.
+const FEW_PIXELS: i32 = 4;
+
 impl Record {
     /// Snaps and orders the corners; nothing where no area is left or the side is not drawn.
     ///
@@ -88,7 +117,7 @@ impl Record {
     /// `reach` is how far from a pixel's center it may be looked at, in steps.
     pub(crate) fn new(
         points: &[ScreenPoint; 3],
-        plane: DepthPlane,
+        plane: impl FnOnce() -> DepthPlane,
         id: u32,
         sides: Sides,
         reach: i32,
@@ -115,8 +144,11 @@ impl Record {
             x.swap(1, 2);
             y.swap(1, 2);
         }
-        // The plane is that of the corners before they were snapped.
-        let first = points[0];
+        if reach == 0 && !covers_any(&x, &y) {
+            return None;
+        }
+        // The plane is that of the corners before they were snapped, found for what is drawn only.
+        let (first, plane) = (points[0], plane());
         let depth = first.depth
             + plane.by_column * (f64::from(x[0]) / steps - first.x)
             + plane.by_row * (f64::from(y[0]) / steps - first.y);

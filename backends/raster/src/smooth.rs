@@ -61,7 +61,7 @@ impl Smooth {
         let mut mixed = [false; TILE_PIXELS];
         for (i, place) in places.iter().enumerate() {
             let moved = bins.solid(tile).map(|record| record.seen_from(*place));
-            let buffer = TileBuffer::of_here(moved, area);
+            let buffer = TileBuffer::of(moved, area);
             let of_place = &mut self.layers[i];
             of_place.clear();
             for record in bins.layers(tile) {
@@ -160,9 +160,8 @@ impl<'a> Painter<'a> {
                 let direction = self.lens.line(x, y).1.normalize_or_zero();
                 looks[i].0 = self.light.scene.environment.background.color(direction);
             } else {
-                let face = faces.find(self.light.scene, self.light.model, self.lens, id);
                 // As a layer, so that its opacity is found.
-                batch.push(x, y, face, LAYER);
+                self.add(&mut batch, faces, (x, y), id, LAYER);
             }
             if batch.is_full() || faces.is_full() || i + 1 == shared.len() {
                 self.light(&mut batch, faces, corners);

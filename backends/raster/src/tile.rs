@@ -301,7 +301,7 @@ impl TileBuffer {
     /// Draws solid triangles, listed by rising ids: of equal depths the lowest wins.
     pub(crate) fn of(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if crate::wide::has_avx2() {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for a processor feature can only be called so"
@@ -320,7 +320,7 @@ impl TileBuffer {
 
     /// The same in the caller's instructions.
     #[inline(always)]
-    pub(crate) fn of_here(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
+    fn of_here(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
         let mut buffer = Self { depth: [f32::NEG_INFINITY; TILE_PIXELS], id: [NO_TRIANGLE; TILE_PIXELS] };
         // The compiler would make masked stores where something is kept or put back, and these take some processors
         // a dozen cycles each. It cannot where it does not know that both places are the same.

@@ -1,26 +1,28 @@
-//! The seam: an inner back end for visibility, and the style laid over it.
+//! How does the host drive the shader: an inner back end for visibility, and the style laid over it?
 
-use crate::contour::{Contours, shows_nothing};
-use crate::tone::Tone;
-use glam::{DVec3, Vec3};
-use polyptych_core::camera::{RowDirections, View};
+use crate::cracks::{self, Surfaces};
+use crate::hatch::Hatching;
+use crate::info::info;
+use crate::ink::Sheaf;
+use crate::light::Lighting;
+use crate::outline::{self, Sight, keeps_lines};
+use crate::paint::{Look, Painting, ROWS, Scratch};
+use crate::paper::Grain;
+use crate::prepare::{Coded, Outlines, colorful, looks};
+use crate::preset::Preset;
+use crate::stroke::Stroke;
+use crate::style::Styles;
+use glam::DVec3;
+use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
-use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer};
-use polyptych_core::lanes::LANES;
-use polyptych_core::parallel::for_each_mut;
-use polyptych_core::scene::{Light, LightKind, Scene};
+use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
+use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::scene::{Light, Scene};
 use polyptych_core::seam::{
-    BackendFactory, BackendInfo, Control, Frame, Need, Parameter, ParameterKind, PassPlan, Phases, Plan,
-    Prepared, Registry, RenderError, Renderer, Report, Settings, Survey, Value,
+    BackendFactory, BackendInfo, Cancelled, Control, Counter, Frame, Need, PassPlan, Phases, Plan, Prepared,
+    Registry, RenderError, Renderer, Report, Settings, Survey,
 };
-use polyptych_core::shade::{fogged, highlight};
-use std::sync::Arc;
-
-/// Back ends that may deliver the visible surfaces; the first is the default.
-const VISIBILITY: &[&str] = &["raster", "voxel", "freeform", "reference"];
-
-/// Rows drawn by one worker at a time.
-const ROWS: u32 = 16;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Makes [`Stylized`] renderers.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,125 +37,38 @@ impl BackendFactory for Factory {
     }
 }
 
-fn parameter(
-    name: &'static str,
-    kind: ParameterKind,
-    default: Value,
-    unit: &'static str,
-    help: &'static str,
-) -> Parameter {
-    Parameter { name, kind, default, unit, help, tag: "", quality_axis: false }
-}
-
-fn info() -> BackendInfo {
-    let color = |text: &str| Value::Text(text.to_owned());
-    let share = ParameterKind::Float { min: 0.0, max: 1.0 };
-    let choice = ParameterKind::Choice { choices: VISIBILITY };
-    BackendInfo {
-        id: "stylized".to_owned(),
-        name: "Stylized shader".to_owned(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        native: Vec::new(),
-        channels: Channels::ALL,
-        photometric: false,
-        parameters: vec![
-            Parameter {
-                quality_axis: true,
-                ..parameter(
-                    "visibility",
-                    choice,
-                    color(VISIBILITY[0]),
-                    "",
-                    "back end that finds the visible surfaces",
-                )
-            },
-            parameter("tone.cool", ParameterKind::Color, color("#2a3f6b"), "", "color away from the light"),
-            parameter("tone.warm", ParameterKind::Color, color("#c9a35c"), "", "color toward the light"),
-            parameter("tone.alpha", share, Value::Float(0.25), "", "share of the own color on the cool side"),
-            parameter("tone.beta", share, Value::Float(0.6), "", "share of the own color on the warm side"),
-            parameter(
-                "tone.steps",
-                ParameterKind::Int { min: 1, max: 32 },
-                Value::Int(6),
-                "steps",
-                "steps of the color's length; 1 leaves it smooth",
-            ),
-            parameter("specular", ParameterKind::Bool, Value::Bool(true), "", "whether highlights are drawn"),
-            parameter(
-                "shadow",
-                ParameterKind::Bool,
-                Value::Bool(true),
-                "",
-                "whether shadows darken the tone",
-            ),
-            parameter("contours", ParameterKind::Bool, Value::Bool(true), "", "whether lines are drawn"),
-            parameter(
-                "contours.width",
-                ParameterKind::Float { min: 0.5, max: 8.0 },
-                Value::Float(1.5),
-                "pixels",
-                "width of lines",
-            ),
-            parameter("contours.color", ParameterKind::Color, color("#1a1614"), "", "color of lines"),
-            parameter(
-                "contours.crease",
-                ParameterKind::Float { min: 1.0, max: 180.0 },
-                Value::Float(40.0),
-                "degrees",
-                "angle from which on a fold has a line",
-            ),
-        ],
-    }
-}
-
-/// Everything of a style that parameters set.
-#[derive(Clone, Copy, Debug)]
-struct Style {
-    tone: Tone,
-    contours: Contours,
-    specular: bool,
-    shadow: bool,
-}
-
-impl Style {
-    fn of(settings: &Settings, declared: &[Parameter]) -> Self {
-        let float = |name: &str| settings.float(declared, name) as f32;
-        Self {
-            tone: Tone {
-                cool: settings.color(declared, "tone.cool"),
-                warm: settings.color(declared, "tone.warm"),
-                alpha: float("tone.alpha"),
-                beta: float("tone.beta"),
-                steps: settings.int(declared, "tone.steps") as u32,
-            },
-            contours: Contours {
-                drawn: settings.bool(declared, "contours"),
-                width: float("contours.width"),
-                color: settings.color(declared, "contours.color"),
-                crease_cosine: float("contours.crease").to_radians().cos(),
-            },
-            specular: settings.bool(declared, "specular"),
-            shadow: settings.bool(declared, "shadow"),
-        }
-    }
-
-    /// Channels that the style reads.
-    fn channels(&self) -> Channels {
-        let base = Channels::of(&[Channel::Distance, Channel::Normal, Channel::Id, Channel::Albedo]);
-        if self.shadow { base.with(Channel::Shadow) } else { base }
-    }
-}
-
 /// The stylized shader.
 pub struct Stylized {
     info: BackendInfo,
     registry: Registry,
     inner: Option<(String, Box<dyn Renderer>)>,
-    prepared: Option<(Arc<Scene>, Style)>,
+    ready: Option<Ready>,
+    outlines: Outlines,
+    coded: Coded,
+    grain: Grain,
+    scratch: Buffers,
+}
+
+/// What a scene was prepared for.
+struct Ready {
+    scene: Arc<Scene>,
+    styles: Styles,
     lights: Vec<Light>,
+    colorful: Vec<bool>,
+    /// Around the scene.
+    ball: (DVec3, f64),
+}
+
+/// Buffers that live from frame to frame.
+struct Buffers {
     visible: Framebuffer,
-    /// Columns of the edge pixels of each row.
-    edges: Vec<Vec<u32>>,
+    looks: Vec<Look>,
+    outline: outline::Scratch,
+    cracks: Vec<cracks::Scratch>,
+    lines: Sheaf,
+    bands: Vec<Mutex<Scratch>>,
+    /// For cameras that bend lines: nothing has them from its edges.
+    without: Vec<bool>,
 }
 
 impl Stylized {
@@ -164,24 +79,103 @@ impl Stylized {
             info: info(),
             registry,
             inner: None,
-            prepared: None,
-            lights: Vec::new(),
-            visible: Framebuffer::new(0, 0, Channels::NONE),
-            edges: Vec::new(),
+            ready: None,
+            outlines: Outlines::default(),
+            coded: Coded::default(),
+            grain: Grain::new(),
+            scratch: Buffers {
+                visible: Framebuffer::new(0, 0, Channels::NONE),
+                looks: Vec::new(),
+                outline: outline::Scratch::default(),
+                cracks: Vec::new(),
+                lines: Sheaf::default(),
+                bands: Vec::new(),
+                without: Vec::new(),
+            },
         }
     }
 
-    fn inner_need(&self, need: &Need) -> Need {
-        let style = Style::of(&need.settings, &self.info.parameters);
-        let wanted = need.channels.iter().filter(|&c| c != Channel::Color);
-        let channels = wanted.fold(style.channels(), Channels::with);
-        Need { channels, settings: Settings::default(), ..need.clone() }
+    /// Finds the lines of a frame without painting it: what a drawing in vectors is made of. Lines of meshes come
+    /// first, in the order of objects.
+    ///
+    /// # Errors
+    /// When nothing was prepared, or the host cancelled.
+    pub fn strokes(
+        &mut self,
+        frame: &Frame,
+        width: u32,
+        height: u32,
+        control: &Control<'_>,
+    ) -> Result<&[Stroke], RenderError> {
+        let (Some(ready), Some((_, inner))) = (&self.ready, &mut self.inner) else {
+            return Err(RenderError::NotPrepared);
+        };
+        let buffers = &mut self.scratch;
+        buffers.reserve(width, height, ready.styles.channels(), ready.scene.objects.len());
+        inner.render(frame, &mut buffers.visible, &quiet(control))?;
+        buffers.find_lines(ready, &self.outlines, &frame.camera, control)?;
+        Ok(&buffers.lines.strokes)
     }
 
-    fn create_inner(&self, settings: &Settings) -> Result<(String, Box<dyn Renderer>), RenderError> {
-        let id = settings.text(&self.info.parameters, "visibility").to_owned();
-        let inner = self.registry.create(&id).map_err(|e| RenderError::Failed(format!("visibility: {e}")))?;
-        Ok((id, inner))
+    /// Draws the lines of a frame as an SVG picture on the style's paper, or on nothing.
+    ///
+    /// # Errors
+    /// When nothing was prepared, or the host cancelled.
+    pub fn svg(
+        &mut self,
+        frame: &Frame,
+        width: u32,
+        height: u32,
+        control: &Control<'_>,
+    ) -> Result<String, RenderError> {
+        self.strokes(frame, width, height, control)?;
+        let ready = self.ready.as_ref().ok_or(RenderError::NotPrepared)?;
+        Ok(crate::svg::picture(&self.scratch.lines.strokes, &ready.scene, &ready.styles, [width, height]))
+    }
+
+    /// Returns the styles that settings name, what is baked for those of before kept.
+    fn styles(&self, scene: &Scene, settings: &Settings) -> Result<Styles, RenderError> {
+        let styles = self.ready.iter().flat_map(|r| &r.styles.all);
+        let before: Vec<Arc<Hatching>> = styles.filter_map(|s| s.hatching.clone()).collect();
+        let names = scene.objects.iter().map(|o| o.name.as_str());
+        Styles::of(settings, &self.info.parameters, names, &before)
+            .map_err(|e| RenderError::Failed(e.to_string()))
+    }
+
+    /// Returns the id of the inner back end, and what it needs.
+    fn inner_need(&self, need: &Need, styles: &Styles) -> Result<(String, Need), RenderError> {
+        let failed = |e: String| RenderError::Failed(e);
+        let declared = &self.info.parameters;
+        let chosen = Preset::chosen(&need.settings, declared)
+            .and_then(|preset| preset.under(&need.settings, declared))
+            .map_err(|e| failed(e.to_string()))?;
+        let other = chosen.text(declared, "visibility.other");
+        let id = if other.is_empty() { chosen.text(declared, "visibility") } else { other }.to_owned();
+        let inner = self.registry.info(&id).map_err(|e| failed(format!("visibility: {e}")))?;
+        if id == self.info.id {
+            return Err(failed("visibility.other: the shader cannot see through itself".to_owned()));
+        }
+        let mut settings = Settings::default();
+        // Which sides are left out is for the one who sees.
+        let cull = chosen.text(declared, "cull");
+        if cull != "none" && inner.parameters.iter().any(|p| p.name == "cull") {
+            settings.set(&id, &inner.parameters, "cull", cull).map_err(|e| failed(e.to_string()))?;
+        }
+        let wanted = need.channels.iter().filter(|&c| c != Channel::Color);
+        let channels = wanted.fold(styles.channels(), Channels::with);
+        let missing = channels.iter().find(|&c| !inner.channels.has(c));
+        if let Some(missing) = missing {
+            return Err(failed(format!("visibility: {id} does not deliver the channel {}", missing.name())));
+        }
+        Ok((id, Need { channels, settings, ..need.clone() }))
+    }
+}
+
+/// A control that tells nobody of finished bands: those of the inner picture are not the picture's.
+fn quiet<'a>(control: &Control<'a>) -> Control<'a> {
+    match control.cancel_flag() {
+        Some(flag) => Control::new(control.threads).cancelled_by(flag),
+        None => Control::new(control.threads),
     }
 }
 
@@ -191,25 +185,31 @@ impl Renderer for Stylized {
     }
 
     fn plan(&self, scene: &Scene, need: &Need) -> Plan {
-        let Ok((id, inner)) = self.create_inner(&need.settings) else { return Plan::default() };
-        let style = Style::of(&need.settings, &self.info.parameters);
-        let mut plan = inner.plan(scene, &self.inner_need(need));
+        let Ok(styles) = self.styles(scene, &need.settings) else { return Plan::default() };
+        let Ok((id, inner_need)) = self.inner_need(need, &styles) else { return Plan::default() };
+        let Ok(inner) = self.registry.create(&id) else { return Plan::default() };
+        let mut plan = inner.plan(scene, &inner_need);
         for pass in &mut plan.passes {
             pass.name = format!("{id}: {}", pass.name);
         }
-        plan.passes.push(PassPlan {
-            name: "tone".to_owned(),
-            needed: true,
-            why: "two colors by the light".to_owned(),
-        });
-        plan.passes.push(PassPlan {
-            name: "contours".to_owned(),
-            needed: style.contours.drawn,
-            why: format!("lines are {}", if style.contours.drawn { "on" } else { "off" }),
-        });
-        // Nanoseconds that a pixel of the background and one of a surface take for tone and lines, on the machine that
-        // all back ends' constants were measured on.
-        let per_pixel = 8.0 + 35.0 * Survey::of(scene, need).seen;
+        let pass = |name: &str, needed: bool, why: &str| PassPlan {
+            name: name.to_owned(),
+            needed,
+            why: why.to_owned(),
+        };
+        let hatches = styles.all.iter().any(|s| s.hatching.is_some());
+        let lines = styles.draw_lines();
+        plan.passes.push(pass("tone", true, "two colors by the light"));
+        plan.passes.push(pass(
+            "hatching",
+            hatches,
+            if hatches { "dark tones have strokes" } else { "the style has no strokes" },
+        ));
+        plan.passes.push(pass("contours", lines, if lines { "lines are on" } else { "lines are off" }));
+        // Nanoseconds that a pixel of the background and one of a surface take for tone, strokes and lines, on the
+        // machine that all back ends' constants were measured on.
+        let surface = 14.0 + if hatches { 16.0 } else { 0.0 } + if lines { 6.0 } else { 0.0 };
+        let per_pixel = 4.0 + surface * Survey::of(scene, need).seen;
         plan.estimated_ms += f64::from(need.width) * f64::from(need.height) * per_pixel * 1e-6;
         plan
     }
@@ -221,15 +221,26 @@ impl Renderer for Stylized {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
-        let id = need.settings.text(&self.info.parameters, "visibility");
-        if self.inner.as_ref().is_none_or(|(current, _)| current != id) {
-            self.inner = Some(self.create_inner(&need.settings)?);
+        let styles = self.styles(scene, &need.settings)?;
+        let (id, inner_need) = self.inner_need(need, &styles)?;
+        if self.inner.as_ref().is_none_or(|(current, _)| *current != id) {
+            let inner =
+                self.registry.create(&id).map_err(|e| RenderError::Failed(format!("visibility: {e}")))?;
+            self.inner = Some((id, inner));
         }
-        let inner_need = self.inner_need(need);
+        self.ready = None;
         let (_, inner) = self.inner.as_mut().ok_or(RenderError::NotPrepared)?;
-        let prepared = inner.prepare(scene, &inner_need, converter, control)?;
-        self.prepared = Some((scene.clone(), Style::of(&need.settings, &self.info.parameters)));
-        self.lights = scene.lights.clone();
+        let draws_meshes = inner.info().draws(polyptych_core::scene::ShapeKind::Mesh);
+        let seen = self.coded.prepare(scene, &styles, draws_meshes);
+        let mut prepared = inner.prepare(&seen, &inner_need, converter, control)?;
+        self.outlines.prepare(scene, &prepared.objects, &styles, need, converter, control)?;
+        self.scratch.looks = looks(scene, &self.coded.objects);
+        let colorful = colorful(scene, &styles);
+        let bounds = scene.bounds();
+        let ball = (bounds.center(), bounds.radius());
+        self.ready =
+            Some(Ready { scene: scene.clone(), styles, lights: scene.lights.clone(), colorful, ball });
+        prepared.bytes += self.bytes();
         Ok(prepared)
     }
 
@@ -239,203 +250,179 @@ impl Renderer for Stylized {
         target: &mut Framebuffer,
         control: &Control<'_>,
     ) -> Result<Report, RenderError> {
-        let (Some((scene, style)), Some((_, inner))) = (&self.prepared, &mut self.inner) else {
+        let (Some(ready), Some((_, inner))) = (&self.ready, &mut self.inner) else {
             return Err(RenderError::NotPrepared);
         };
         let mut phases = Phases::start();
+        let buffers = &mut self.scratch;
+        let lent = target.channels().iter().filter(|&c| c != Channel::Color);
+        let lent = lent.fold(Channels::NONE, Channels::with);
+        let channels = lent.iter().fold(ready.styles.channels(), Channels::with);
         let (width, height) = (target.width(), target.height());
-        let wanted = target.channels().iter().filter(|&c| c != Channel::Color);
-        let channels = wanted.fold(style.channels(), Channels::with);
+        buffers.reserve(width, height, channels, ready.scene.objects.len());
+        // The inner back end draws into the target's own planes, so that none is copied.
+        buffers.visible.exchange(target, lent);
+        let result = inner.render(frame, &mut buffers.visible, &quiet(control));
+        phases.end("visibility");
+        let painted = match &result {
+            Ok(_) if target.channels().has(Channel::Color) => {
+                buffers.paint(ready, &self.outlines, &self.grain, &frame.camera, target, &mut phases, control)
+            }
+            _ => Ok(()),
+        };
+        if lent.has(Channel::Albedo) && self.coded.objects.contains(&true) {
+            decode(ready, &self.coded.objects, &mut buffers.visible, control.threads);
+        }
+        buffers.visible.exchange(target, lent);
+        let report = result?;
+        painted?;
+        if !target.channels().has(Channel::Color) {
+            target.for_each_band(control.threads, ROWS, &|band| control.finished(&band));
+        }
+        let mut counters = report.counters;
+        if let Some(free) = counters.iter_mut().find(|c| c.is_none()) {
+            *free = Some(Counter { name: "strokes", count: self.scratch.lines.strokes.len() as u64 });
+        }
+        Ok(Report { phases, counters, bytes: report.bytes + self.bytes(), ..report })
+    }
+}
+
+impl Stylized {
+    /// Returns the bytes held besides those of the inner back end.
+    fn bytes(&self) -> u64 {
+        let styles = self.ready.iter().flat_map(|r| &r.styles.all);
+        let maps: u64 = styles.filter_map(|s| s.hatching.as_ref()).map(|h| h.bytes()).sum();
+        let buffers = &self.scratch;
+        let bands: usize = buffers.bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
+        let cracks: usize = buffers.cracks.iter().map(cracks::Scratch::bytes).sum();
+        let drawn = buffers.visible.bytes() + buffers.outline.bytes() + buffers.lines.bytes();
+        maps + self.outlines.bytes() + self.grain.bytes() + drawn + (bands + cracks) as u64
+    }
+}
+
+impl Buffers {
+    fn reserve(&mut self, width: u32, height: u32, channels: Channels, objects: usize) {
+        let bands = height.div_ceil(ROWS) as usize;
         if (self.visible.width(), self.visible.height(), self.visible.channels()) != (width, height, channels)
         {
             self.visible = Framebuffer::new(width, height, channels);
-            self.edges = (0..height).map(|_| Vec::with_capacity(width as usize)).collect();
+            self.cracks = (0..bands).map(|_| cracks::Scratch::default()).collect();
+            self.bands = (0..bands).map(|_| Mutex::default()).collect();
         }
-        let report = inner.render(frame, &mut self.visible, control)?;
-        phases.end("visibility");
-        let view = frame.camera.view(width, height);
-        let visible = &self.visible;
-        if style.contours.drawn && target.channels().has(Channel::Color) {
-            for_each_mut(control.threads, &mut self.edges, ROWS as usize, &|y, row| {
-                style.contours.mark_row(visible, &view, y as u32, row);
-            });
-            phases.end("contours");
+        self.without.resize(objects, false);
+    }
+
+    /// Finds the lines of what was seen.
+    fn find_lines(
+        &mut self,
+        ready: &Ready,
+        outlines: &Outlines,
+        camera: &Camera,
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
+        let Self { visible, outline, cracks, lines, without, .. } = self;
+        let visible = &*visible;
+        lines.strokes.clear();
+        if !ready.styles.draw_lines() {
+            return Ok(());
         }
-        let painting =
-            Painting { scene, style, view, visible, edges: &self.edges, light: Lighting::of(&self.lights) };
+        let view = camera.view(visible.width(), visible.height());
+        let straight = keeps_lines(&camera.projection);
+        if straight {
+            let sight = Sight { camera, view, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
+            outline.fill(&outlines.bodies, &sight, control.threads);
+        } else {
+            outline.clear();
+        }
+        control.check()?;
+        let surfaces = Surfaces {
+            visible,
+            view,
+            styles: &ready.styles,
+            pixel: view.pixel_size(1.0),
+            is_parallel: matches!(camera.projection, Projection::Orthographic { .. }),
+            outlined: if straight { &outlines.outlined } else { without },
+            colorful: &ready.colorful,
+        };
+        for_each_mut(control.threads, cracks, 1, &|band, scratch| {
+            let first = band as u32 * ROWS;
+            if control.is_cancelled() {
+                scratch.strokes.clear();
+            } else {
+                surfaces.find(first..first + ROWS, scratch);
+            }
+        });
+        control.check()?;
+        lines.strokes.extend(outline.strokes());
+        lines.strokes.extend(cracks.iter().flat_map(|c| &c.strokes));
+        Ok(())
+    }
+
+    /// Finds lines and paints.
+    fn paint(
+        &mut self,
+        ready: &Ready,
+        outlines: &Outlines,
+        grain: &Grain,
+        camera: &Camera,
+        target: &mut Framebuffer,
+        phases: &mut Phases,
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
+        self.find_lines(ready, outlines, camera, control)?;
+        self.lines.sort(&ready.styles, target.height(), ROWS);
+        phases.end("contours");
+        let scene = &*ready.scene;
+        let hatching = |index: usize| {
+            let style = usize::from(ready.styles.index(index as u32 + 1));
+            ready.styles.all[style].hatching.as_ref()
+        };
+        for (index, look) in self.looks.iter_mut().enumerate() {
+            if let Some(hatching) = hatching(index) {
+                look.place(&scene.objects[index], camera, hatching.scale);
+            }
+        }
+        let (center, radius) = ready.ball;
+        let middle = center.distance(camera.eye);
+        let depths = [(middle - radius).max(0.0) as f32, (middle + radius) as f32];
+        let painting = Painting {
+            scene,
+            styles: &ready.styles,
+            looks: &self.looks,
+            view: camera.view(target.width(), target.height()),
+            camera,
+            visible: &self.visible,
+            light: Lighting::of(&ready.lights),
+            grain,
+            lines: &self.lines,
+            depths,
+            any_coded: self.looks.iter().any(|look| look.is_coded),
+        };
+        let bands = &self.bands;
         target.for_each_band(control.threads, ROWS, &|mut band| {
             if !control.is_cancelled() {
-                painting.draw(&mut band);
+                let scratch = &bands[(band.first_row / ROWS) as usize];
+                painting.draw(&mut band, &mut scratch.lock().unwrap_or_else(PoisonError::into_inner));
                 control.finished(&band);
             }
         });
         control.check()?;
         phases.end("tone");
-        Ok(Report { phases, ..report })
+        Ok(())
     }
 }
 
-/// The lights, as far as tone asks for them.
-struct Lighting<'a> {
-    lights: &'a [Light],
-    /// The only light's direction when it is the same everywhere.
-    uniform: Option<Vec3>,
-}
-
-impl<'a> Lighting<'a> {
-    fn of(lights: &'a [Light]) -> Self {
-        let uniform = match lights {
-            [Light { kind: LightKind::Directional { direction }, .. }] => {
-                Some(-direction.normalize_or(DVec3::NEG_Y).as_vec3())
-            }
-            _ => None,
-        };
-        Self { lights, uniform }
-    }
-
-    /// Returns the mean direction to the lights, weighted by what arrives of each; to the eye without lights.
-    fn toward(&self, position: impl Fn() -> DVec3, to_eye: impl Fn() -> Vec3) -> Vec3 {
-        if let Some(direction) = self.uniform {
-            return direction;
-        }
-        let p = position();
-        let arriving = self.lights.iter().filter_map(|l| l.arriving(p));
-        let sum = arriving.map(|a| a.to_light.as_vec3() * a.radiance.element_sum()).sum::<Vec3>();
-        sum.try_normalize().unwrap_or_else(to_eye)
-    }
-}
-
-/// What one frame is painted with.
-struct Painting<'a> {
-    scene: &'a Scene,
-    style: &'a Style,
-    view: View<'a>,
-    visible: &'a Framebuffer,
-    edges: &'a [Vec<u32>],
-    light: Lighting<'a>,
-}
-
-impl Painting<'_> {
-    /// Paints a band with the widest registers there are; the bytes do not depend on them.
-    fn draw(&self, band: &mut Band<'_>) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.band_avx2(band) };
-        }
-        self.band(band);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn band_avx2(&self, band: &mut Band<'_>) {
-        self.band(band);
-    }
-
-    #[inline(always)]
-    fn band(&self, band: &mut Band<'_>) {
-        let from = band.first_row as usize * band.width as usize;
-        let count = band.rows as usize * band.width as usize;
-        fn copy<T: Copy>(to: &mut [T], from: &[T], first: usize, count: usize) {
-            if !to.is_empty() {
-                to.copy_from_slice(&from[first..first + count]);
+/// Puts colors in place of texture coordinates, for those who asked for colors.
+fn decode(ready: &Ready, coded: &[bool], visible: &mut Framebuffer, threads: &dyn Threads) {
+    visible.for_each_band(threads, ROWS, &|band| {
+        for (id, albedo) in band.id.iter().zip(band.albedo) {
+            let index = id.wrapping_sub(1) as usize;
+            if coded.get(index).copied().unwrap_or(false) {
+                let material =
+                    ready.scene.material(&ready.scene.objects[index], albedo.z.round().max(0.0) as usize);
+                let at = Some([albedo.x, albedo.y]);
+                *albedo = ready.scene.base_color(material, at, glam::Vec3::ZERO, glam::Vec3::Y, 0.0).0;
             }
         }
-        copy(band.distance, self.visible.distance(), from, count);
-        copy(band.normal, self.visible.normal(), from, count);
-        copy(band.id, self.visible.id(), from, count);
-        copy(band.albedo, self.visible.albedo(), from, count);
-        copy(band.shadow, self.visible.shadow(), from, count);
-        copy(band.coverage, self.visible.coverage(), from, count);
-        if band.color.is_empty() {
-            return;
-        }
-        for row in 0..band.rows {
-            let y = band.first_row + row;
-            let line = &mut band.color[(row * band.width) as usize..((row + 1) * band.width) as usize];
-            let directions = self.view.row(y);
-            if let Some(directions) = directions {
-                directions.fill(&self.scene.environment.background, 0, line);
-            }
-            let ids = &self.visible.id()[(y * band.width) as usize..][..band.width as usize];
-            for (piece, (ids, colors)) in ids.chunks(LANES).zip(line.chunks_mut(LANES)).enumerate() {
-                if directions.is_some() && shows_nothing(ids) {
-                    continue;
-                }
-                for (lane, (id, color)) in ids.iter().zip(colors).enumerate() {
-                    if *id != 0 || directions.is_none() {
-                        *color = self.pixel((piece * LANES + lane) as u32, y, directions.as_ref());
-                    }
-                }
-            }
-            if self.style.contours.drawn {
-                self.lines(y, line);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn pixel(&self, x: u32, y: u32, directions: Option<&RowDirections>) -> Vec3 {
-        let i = (y * self.visible.width() + x) as usize;
-        let ray = || self.view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        let id = self.visible.id()[i];
-        if id == 0 {
-            return ray().map_or(Vec3::ZERO, |r| self.scene.environment.background.color(r.direction));
-        }
-        let (normal, distance) = (self.visible.normal()[i], self.visible.distance()[i]);
-        let position = || ray().map_or(DVec3::ZERO, |r| r.at(f64::from(distance)));
-        let to_eye = || match directions {
-            Some(directions) => -directions.at(x),
-            None => ray().map_or(Vec3::Y, |r| -r.direction.as_vec3()),
-        };
-        let light = self.light.toward(position, to_eye);
-        let facing = normal.dot(light);
-        // In full shadow a surface is as cool as one that turns its side to the light.
-        let lit = if self.style.shadow { self.visible.shadow()[i] } else { 1.0 };
-        let shaded = if facing > 0.0 { facing * lit } else { facing };
-        let mut color = self.style.tone.color(self.visible.albedo()[i], shaded);
-        if self.style.specular && facing > 0.0 && lit > 0.0 {
-            let object = &self.scene.objects[id as usize - 1];
-            let material = self.scene.material(object, 0);
-            if material.specular > 0.0 {
-                let half = (light + to_eye()).normalize_or_zero();
-                let cosine = half.dot(normal).max(0.0);
-                color += Vec3::splat(material.specular * lit * highlight(cosine, material.shininess));
-            }
-        }
-        fogged(&self.scene.environment, color, f64::from(distance))
-    }
-
-    /// Lays the lines of the rows around over a row.
-    fn lines(&self, y: u32, colors: &mut [Vec3]) {
-        /// Pixels at once, on the stack: no memory is asked for while drawing.
-        const PIECE: usize = 128;
-        let contours = &self.style.contours;
-        let reach = contours.reach();
-        let rows = y.saturating_sub(reach)..(y + reach + 1).min(self.edges.len() as u32);
-        if rows.clone().all(|row| self.edges[row as usize].is_empty()) {
-            return;
-        }
-        for (piece, colors) in colors.chunks_mut(PIECE).enumerate() {
-            let mut coverage = [0.0f32; PIECE];
-            let coverage = &mut coverage[..colors.len()];
-            let mut touched = false;
-            for row in rows.clone() {
-                let edges = &self.edges[row as usize];
-                touched |= contours.splat_row(edges, row as f32 - y as f32, piece * PIECE, coverage);
-            }
-            if !touched {
-                continue;
-            }
-            for (color, &cover) in colors.iter_mut().zip(&*coverage) {
-                if cover > 0.0 {
-                    *color = color.lerp(contours.color, cover);
-                }
-            }
-        }
-    }
+    });
 }

@@ -1,6 +1,7 @@
 //! Which color has a surface that faces the light so much?
 
 use glam::Vec3;
+use polyptych_core::lanes::{F32x8, LANES, Mask8, Vec3x8};
 
 /// Two colors and how they are mixed, linear light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +44,34 @@ impl Tone {
         }
         let n = self.steps as f32;
         smooth * ((length * n).round() / (n * length))
+    }
+
+    /// Returns eight tones, the edges of steps as wide as a pixel: by `slope`, how much the cosine to the light changes
+    /// over one. Where it does not change, and a pixel or more away from edges, these are those of [`Tone::color`].
+    ///
+    /// With `s = n |I|` an edge is where `s` passes a half; `ds = n (I . dI/dt) / |I| dt`, and `dt` is half the slope.
+    #[inline(always)]
+    pub(crate) fn colors(&self, own: Vec3x8, facing: F32x8, slope: F32x8) -> Vec3x8 {
+        let (zero, one, half) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(0.5));
+        let t = (one + facing) * half;
+        let cool = Vec3x8::splat(self.cool) + own.scaled(F32x8::splat(self.alpha));
+        let warm = Vec3x8::splat(self.warm) + own.scaled(F32x8::splat(self.beta));
+        let smooth = warm.scaled(t) + cool.scaled(one - t);
+        if self.steps <= 1 {
+            return smooth;
+        }
+        let n = F32x8::splat(self.steps as f32);
+        let length = smooth.length();
+        let s = length * n;
+        let change = smooth.dot(warm - cool).abs() * n * half * slope / length.max(F32x8::splat(1e-12));
+        let mut below = s;
+        for i in 0..LANES {
+            below.0[i] = s.0[i].floor();
+        }
+        let beyond = (s - below - half) / change.max(F32x8::splat(1e-6)) + half;
+        let step = below + beyond.max(zero).min(one);
+        let there: Mask8 = s.above(zero);
+        smooth.scaled(there.pick(step / s, zero))
     }
 }
 

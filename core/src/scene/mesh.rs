@@ -34,6 +34,13 @@ impl Mesh {
         Aabb::of_points(used.filter_map(|&i| self.positions.get(i as usize)).map(|p| p.as_dvec3()))
     }
 
+    /// Tells whether no corner is anywhere; it does not look further than to the first that is.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let mut used = self.triangles.iter().flatten().chain(self.segments.iter().flatten());
+        !used.any(|&i| self.positions.get(i as usize).is_some_and(|p| p.is_finite()))
+    }
+
     /// Returns the material slot of a triangle.
     #[must_use]
     pub fn slot(&self, triangle: usize) -> usize {

@@ -130,6 +130,15 @@ impl Shape {
         }
     }
 
+    /// Tells whether there is nothing of it anywhere.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        match self {
+            Self::Mesh(mesh) => mesh.is_empty(),
+            other => other.bounds().is_empty(),
+        }
+    }
+
     /// Bounds the shape in its own space.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
@@ -210,7 +219,7 @@ impl Object {
             Some("its transform is not finite")
         } else if determinant == 0.0 || !(1.0 / determinant).is_finite() {
             Some("its transform squeezes it to nothing")
-        } else if self.shape.bounds().is_empty() {
+        } else if self.shape.is_empty() {
             Some("it is empty")
         } else {
             None

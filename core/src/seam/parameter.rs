@@ -50,7 +50,12 @@ pub enum ParameterKind {
     },
     /// A color, `#rrggbb`.
     Color,
+    /// Any line of text: a file, a list, the name of something. It does not cross the plugin border.
+    Text,
 }
+
+/// Most letters of a [`ParameterKind::Text`].
+const LONGEST_TEXT: usize = 4096;
 
 /// The value of a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -120,6 +125,12 @@ impl Parameter {
                 Ok(_) => Value::Text(text.to_owned()),
                 Err(_) => return Err(refuse()),
             },
+            ParameterKind::Text => {
+                if text.len() > LONGEST_TEXT || text.contains(char::is_control) {
+                    return Err(refuse());
+                }
+                Value::Text(text.to_owned())
+            }
         };
         Ok(value)
     }
@@ -135,6 +146,7 @@ impl Parameter {
                 format!("one of {}; the nearest is `{nearest}`", choices.join(", "))
             }
             ParameterKind::Color => "a color is written #rrggbb".to_owned(),
+            ParameterKind::Text => format!("one line of at most {LONGEST_TEXT} letters"),
         }
     }
 }

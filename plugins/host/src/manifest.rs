@@ -204,6 +204,7 @@ impl ParameterEntry {
             }
             ParameterKind::Choice { choices } => ("choice", None, None, choices),
             ParameterKind::Color => ("color", None, None, &[][..]),
+            ParameterKind::Text => ("text", None, None, &[][..]),
         };
         Self {
             name: parameter.name.to_owned(),
@@ -242,6 +243,7 @@ impl ParameterEntry {
                 ParameterKind::Choice { choices: choices.leak() }
             }
             "color" => ParameterKind::Color,
+            "text" => ParameterKind::Text,
             other => return Err(format!("type `{other}`: use bool, int, float, choice or color")),
         };
         Ok(Parameter {

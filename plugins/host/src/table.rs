@@ -191,7 +191,7 @@ unsafe fn parameter(flat: &PolyptychParameter) -> Result<Parameter, String> {
         ParameterKind::Bool => Value::Bool(flat.initial.integer != 0),
         ParameterKind::Int { .. } => Value::Int(flat.initial.integer),
         ParameterKind::Float { .. } => Value::Float(flat.initial.number),
-        ParameterKind::Choice { .. } | ParameterKind::Color => Value::Text(word),
+        ParameterKind::Choice { .. } | ParameterKind::Color | ParameterKind::Text => Value::Text(word),
     };
     let parameter = Parameter {
         name: keep(&name),

@@ -61,7 +61,7 @@ fn bits(kinds: &[ShapeKind]) -> u32 {
 }
 
 fn flat_info(info: &BackendInfo, accepts: &[ShapeKind]) -> PolyptychInfo {
-    let parameters: Vec<PolyptychParameter> = info.parameters.iter().map(flat_parameter).collect();
+    let parameters: Vec<PolyptychParameter> = crossing(info).map(flat_parameter).collect();
     PolyptychInfo {
         size: size_of::<PolyptychInfo>() as u32,
         native_shapes: bits(&info.native),
@@ -78,6 +78,11 @@ fn flat_info(info: &BackendInfo, accepts: &[ShapeKind]) -> PolyptychInfo {
 
 const NO_VALUE: PolyptychValue = PolyptychValue { integer: 0, number: 0.0, text: std::ptr::null() };
 
+/// Lists the parameters that cross the border: lines of text do not.
+pub(crate) fn crossing(info: &BackendInfo) -> impl Iterator<Item = &Parameter> {
+    info.parameters.iter().filter(|p| p.kind != ParameterKind::Text)
+}
+
 fn flat_parameter(parameter: &Parameter) -> PolyptychParameter {
     let int = |v: i64| PolyptychValue { integer: v, ..NO_VALUE };
     let float = |v: f64| PolyptychValue { number: v, ..NO_VALUE };
@@ -87,6 +92,7 @@ fn flat_parameter(parameter: &Parameter) -> PolyptychParameter {
         ParameterKind::Float { min, max } => (abi::POLYPTYCH_FLOAT, float(min), float(max), &[][..]),
         ParameterKind::Choice { choices } => (abi::POLYPTYCH_CHOICE, NO_VALUE, NO_VALUE, choices),
         ParameterKind::Color => (abi::POLYPTYCH_RGB, NO_VALUE, NO_VALUE, &[][..]),
+        ParameterKind::Text => unreachable!("lines of text do not cross the border"),
     };
     let initial = match &parameter.default {
         Value::Bool(v) => int(i64::from(*v)),

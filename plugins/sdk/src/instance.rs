@@ -180,12 +180,12 @@ impl<B: Renderer + Default + 'static> Instance<B> {
 
     fn settings(&self, values: &[PolyptychValue]) -> Result<Settings, RenderError> {
         let mut settings = Settings::default();
-        for (parameter, value) in self.info.parameters.iter().zip(values) {
+        for (parameter, value) in crate::info::crossing(&self.info).zip(values) {
             let words = match parameter.kind {
                 ParameterKind::Bool => (value.integer != 0).to_string(),
                 ParameterKind::Int { .. } => value.integer.to_string(),
                 ParameterKind::Float { .. } => value.number.to_string(),
-                ParameterKind::Choice { .. } | ParameterKind::Color => {
+                ParameterKind::Choice { .. } | ParameterKind::Color | ParameterKind::Text => {
                     // SAFETY: the host passes text for these kinds.
                     unsafe { crate::scene::words(value.text) }
                 }

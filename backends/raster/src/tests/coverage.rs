@@ -15,7 +15,7 @@ fn count(width: u32, height: u32, triangles: &[[Corner; 3]]) -> Vec<u32> {
     let mut hits = vec![0; (width * height) as usize];
     for corners in triangles {
         let points = corners.map(|(x, y)| ScreenPoint { x, y, depth: 1.0 });
-        let Some(record) = Record::new(&points, DepthPlane::through(&points), 0, Sides::Both, 0) else {
+        let Some(record) = Record::new(&points, || DepthPlane::through(&points), 0, Sides::Both, 0) else {
             continue;
         };
         grid.for_each_touched(&record, |tile| {

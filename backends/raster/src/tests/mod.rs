@@ -7,6 +7,7 @@ mod lines;
 mod pictures;
 mod shadows;
 mod smooth;
+mod wide;
 
 use crate::Raster;
 use glam::{DVec3, Vec3};

@@ -1,0 +1,235 @@
+//! Does something stand between a point and a light?
+//!
+//! A lookup takes the four texels around a point and holds the triangles that they name against the exact point, so
+//! there is no bias and no acne: a triangle blocks
+//!
+//! 1. if the segment from the point to the light runs through it: exact edges wherever triangles are larger
+//!    than texels; or
+//! 2. if all four texels show something in front, for triangles too small to be named under the point. In front
+//!    means on both sides: the triangle's plane is in front of the point, and the triangle at the texel is in
+//!    front of the point's plane. The neighbor across a convex fold fails the second, the one across a concave
+//!    fold the first, one in the same plane both.
+//!
+//! Comparing planes instead of equal names is ours. Points are placed on the map eight at once; triangles are held
+//! against them one by one, since gathering them for lanes takes longer than what is then reckoned, and most points see
+//! no triangle but their own.
+
+use crate::face::{Face, Place};
+use crate::lens::{Lens, cube_face};
+use crate::model::{Class, Model, Role};
+use crate::shadow::{MapFace, Shadows, looking};
+use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH};
+use glam::DVec3;
+use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
+use polyptych_core::scene::Scene;
+
+/// The ways from eight points to a light.
+pub(crate) struct Sights {
+    /// Relative to [`Shadows::origin`].
+    pub(crate) place: DVec3x8,
+    /// The triangles that the points are on.
+    pub(crate) triangle: [u32; LANES],
+    pub(crate) to_light: DVec3x8,
+    pub(crate) distance: F64x8,
+}
+
+/// What the map of a light shows around eight points.
+pub(crate) struct Looks<'a> {
+    /// Nothing where the light does not see the point.
+    face: [Option<&'a MapFace>; LANES],
+    /// Column and row of the first of the texels whose centers are the corners of the square around the point.
+    texel: [[i32; 2]; LANES],
+    ids: [[u32; 4]; LANES],
+}
+
+/// A triangle as seen from a point.
+struct Blocker {
+    /// Relative to the point.
+    corners: [DVec3; 3],
+    /// Not of unit length.
+    normal: DVec3,
+    /// `normal . p` of the points of its plane.
+    offset: f64,
+}
+
+/// The way from a point to a light.
+struct Sight {
+    place: DVec3,
+    triangle: u32,
+    to_light: DVec3,
+    distance: f64,
+}
+
+impl<'a> Looks<'a> {
+    fn none() -> Self {
+        Self { face: [None; LANES], texel: [[0; 2]; LANES], ids: [[NO_TRIANGLE; 4]; LANES] }
+    }
+
+    /// Looks where a point falls on a column and row of a face, if the light sees them.
+    #[inline(always)]
+    fn look(&mut self, i: usize, face: &'a MapFace, x: f64, y: f64, ahead: f64) {
+        let (right, bottom) = (f64::from(face.lens.width) + 0.5, f64::from(face.lens.height) + 0.5);
+        if (ahead > 0.0) & (x >= -0.5) & (x <= right) & (y >= -0.5) & (y <= bottom) {
+            self.texel[i] = [(x + 0.5) as i32 - 1, (y + 0.5) as i32 - 1];
+            self.ids[i] = face.square(self.texel[i][0], self.texel[i][1]);
+            self.face[i] = Some(face);
+        }
+    }
+}
+
+impl Blocker {
+    #[inline(always)]
+    fn of(shadows: &Shadows, id: u32, place: DVec3) -> Self {
+        let [a, b, c] = shadows.blockers[id as usize].0;
+        let corners = [a.as_dvec3() - place, b.as_dvec3() - place, c.as_dvec3() - place];
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        Self { corners, normal, offset: normal.dot(corners[0]) }
+    }
+
+    /// Tells whether a line through the point passes through the triangle.
+    #[inline(always)]
+    fn is_crossed(&self, direction: DVec3) -> bool {
+        let [a, b, c] = self.corners;
+        // Volumes spanned by the line and each edge, of one sign inside (edges belong to both neighbors).
+        let u = b.cross(c).dot(direction);
+        let v = c.cross(a).dot(direction);
+        let w = a.cross(b).dot(direction);
+        ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0))
+    }
+
+    /// Tells whether its plane is between the point and the light.
+    #[inline(always)]
+    fn is_before(&self, sight: &Sight, tolerance: f64) -> bool {
+        let (gap, slope) = (self.offset, self.normal.dot(sight.to_light));
+        gap * slope > 0.0
+            && gap.abs() < slope.abs() * sight.distance
+            && gap * gap > self.normal.length_squared() * (tolerance * tolerance)
+    }
+}
+
+impl Shadows {
+    /// Looks points up in the map of a light. `origin` is what the places are relative to.
+    #[inline(always)]
+    pub(crate) fn look(&self, lamp: usize, places: DVec3x8, origin: DVec3, wanted: Mask8) -> Looks<'_> {
+        let mut looks = Looks::none();
+        let faces = &self.maps[lamp].faces[..];
+        let Some(first) = faces.first() else { return looks };
+        let places = places + DVec3x8::splat(origin - self.origin);
+        let [x, y, ahead] = first.lens.places(places - DVec3x8::splat(first.lens.origin));
+        for i in (0..LANES).filter(|&i| wanted.has(i)) {
+            if faces.len() == 1 {
+                looks.look(i, first, x.0[i], y.0[i], ahead.0[i]);
+            } else {
+                let place = places.get(i);
+                let face = &faces[cube_face(place - first.lens.origin)];
+                let (x, y, ahead) = face.lens.place(place - face.lens.origin);
+                looks.look(i, face, x, y, ahead);
+            }
+        }
+        looks
+    }
+
+    /// Tells at which of the wanted points one of the triangles at the texels around it stands between it and the
+    /// light.
+    #[inline(always)]
+    pub(crate) fn blocked(
+        &self,
+        (scene, model): (&Scene, &Model),
+        looks: &Looks<'_>,
+        sights: &Sights,
+        wanted: Mask8,
+    ) -> Mask8 {
+        let mut blocked = Mask8::NONE;
+        for i in 0..LANES {
+            let triangle = sights.triangle[i];
+            let any = looks.ids[i].iter().any(|&id| (id != NO_TRIANGLE) & (id != triangle));
+            if wanted.has(i) && any {
+                let (place, to_light) = (sights.place.get(i), sights.to_light.get(i));
+                let sight = Sight { place, triangle, to_light, distance: sights.distance.0[i] };
+                if self.is_blocked(scene, model, looks, i, &sight) {
+                    blocked.0[i] = u32::MAX;
+                }
+            }
+        }
+        blocked
+    }
+
+    fn is_blocked(&self, scene: &Scene, model: &Model, looks: &Looks<'_>, i: usize, sight: &Sight) -> bool {
+        let (Some(face), ids) = (looks.face[i], &looks.ids[i]) else { return false };
+        let mut all_before = true;
+        for (k, &id) in ids.iter().enumerate() {
+            if (id == NO_TRIANGLE) | (id == sight.triangle) {
+                all_before = false;
+            } else if !ids[..k].contains(&id) {
+                let blocker = Blocker::of(self, id, sight.place);
+                let is_before = blocker.is_before(sight, self.tolerance);
+                all_before &= is_before;
+                if is_before && blocker.is_crossed(sight.to_light) && self.is_solid(scene, model, id, sight) {
+                    return true;
+                }
+            }
+        }
+        all_before && self.are_above(face, looks.texel[i], ids, sight)
+    }
+
+    /// Tells whether the triangles that texels name are, at the texels' centers, on the light's side of the plane of
+    /// the point's own.
+    fn are_above(&self, face: &MapFace, [column, row]: [i32; 2], ids: &[u32; 4], sight: &Sight) -> bool {
+        let own = Blocker::of(self, sight.triangle, sight.place);
+        let lowest = own.normal.length() * self.tolerance;
+        let side = own.normal.dot(sight.to_light).signum();
+        ids.iter().zip([(0, 0), (1, 0), (0, 1), (1, 1)]).all(|(&id, (right, down))| {
+            let there = Blocker::of(self, id, sight.place);
+            let (x, y) = (f64::from(column + right) + 0.5, f64::from(row + down) + 0.5);
+            let (start, direction) = face.lens.line(x, y);
+            let start = start + face.lens.origin - sight.place;
+            let t = (there.offset - there.normal.dot(start)) / there.normal.dot(direction);
+            let height = own.normal.dot(start + direction * t) - own.offset;
+            height * side > lowest
+        })
+    }
+
+    /// Tells whether a triangle is no hole where the way to the light crosses it.
+    #[inline(always)]
+    fn is_solid(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
+        !self.any_holes || self.is_no_hole(scene, model, id, sight)
+    }
+
+    #[inline(never)]
+    fn is_no_hole(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
+        let (index, triangle) = model.find(id);
+        let part = &model.parts[index];
+        if part.class(Role::Light, part.mesh().slot(triangle)) == Class::Solid {
+            return true;
+        }
+        let lens = Lens::parallel(self.origin + sight.place, looking(sight.to_light), [1.0; 2], [0; 2]);
+        let place = Place { scene, model, lens: &lens, x: 0.0, y: 0.0 };
+        place.is_solid(&Face::new(scene, model, &lens, id))
+    }
+}
+
+impl MapFace {
+    /// Returns the triangles at a texel, its right neighbor, and the two below.
+    #[inline(always)]
+    fn square(&self, column: i32, row: i32) -> [u32; 4] {
+        let (x, y) = (column as u32, row as u32);
+        let (in_tile_x, in_tile_y) = (x % TILE_WIDTH, y % TILE_HEIGHT);
+        let in_one_tile = in_tile_x + 1 < TILE_WIDTH && in_tile_y + 1 < TILE_HEIGHT;
+        if in_one_tile && x + 1 < self.lens.width && y + 1 < self.lens.height {
+            let tile = &self.tiles[(y / TILE_HEIGHT * self.grid.columns + x / TILE_WIDTH) as usize];
+            let i = (in_tile_y * TILE_WIDTH + in_tile_x) as usize;
+            let below = i + TILE_WIDTH as usize;
+            return [tile[i], tile[i + 1], tile[below], tile[below + 1]];
+        }
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.triangle(column + dx, row + dy))
+    }
+
+    fn triangle(&self, column: i32, row: i32) -> u32 {
+        if column < 0 || row < 0 || column >= self.lens.width as i32 || row >= self.lens.height as i32 {
+            return NO_TRIANGLE;
+        }
+        let (column, row) = (column as u32, row as u32);
+        let tile = (row / TILE_HEIGHT) * self.grid.columns + column / TILE_WIDTH;
+        self.tiles[tile as usize][(row % TILE_HEIGHT * TILE_WIDTH + column % TILE_WIDTH) as usize]
+    }
+}

@@ -1,0 +1,316 @@
+//! Which strokes lie on a dark tone?
+//!
+//! Strokes are baked into maps, one for each halving of the pattern's size on the picture. A texel says how far the
+//! middle of the nearest stroke is, and how often that stroke's number can be halved: its order. The width is laid
+//! on in pixels when a pixel is drawn, so that it is the same near and far. From map to map every other stroke is
+//! gone; it thins out on the way, and those that stay take on the threshold of their new order, so nothing pops. A
+//! dark tone has the strokes of the lighter ones.
+//!
+//! Source: E. Praun, H. Hoppe, M. Webb, A. Finkelstein, *Real-time hatching*, SIGGRAPH 2001, with distances in place
+//! of painted levels.
+
+use crate::bake::{self, Level, MIDDLE, SIGNED_STEPS};
+use glam::Vec3;
+use polyptych_core::lanes::{F32x8, LANES};
+use polyptych_core::load::Limits;
+use polyptych_core::load::image::decode;
+use polyptych_core::seam::{Parameter, Settings};
+use std::sync::Arc;
+
+/// Texels along the edge of the largest map.
+pub(crate) const EDGE: u32 = 256;
+/// Steps of a stored distance in a texel.
+pub(crate) const STEPS: f32 = 32.0;
+/// Most levels of darkness, and most orders of strokes.
+const MOST_LEVELS: usize = 8;
+/// Most pixels of a picture of strokes.
+const MOST_PIXELS: u64 = 1 << 24;
+
+/// Why strokes cannot be had.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct HatchError(String);
+
+/// What strokes look like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Set {
+    Pencil,
+    Ink,
+    Dots,
+    Images,
+}
+
+/// What strokes stick to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sticks {
+    /// The body, along the three axes of its space.
+    Triplanar,
+    /// The body, by its texture coordinates.
+    Uv,
+    /// The picture.
+    Screen,
+}
+
+/// What maps are baked of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Source {
+    set: Set,
+    images: String,
+    /// Only pictures have theirs baked in; bits, to be compared.
+    thresholds: Vec<u32>,
+}
+
+/// Strokes with their colors, ready to be laid on.
+#[derive(Clone, Debug)]
+pub(crate) struct Hatching {
+    source: Source,
+    levels: Arc<[Level]>,
+    /// Across the strokes of both families, where there are strokes.
+    across: Option<[[f32; 2]; 2]>,
+    pub(crate) set: Set,
+    pub(crate) sticks: Sticks,
+    pub(crate) scale: f32,
+    pub(crate) color: Vec3,
+    pub(crate) own: f32,
+    pub(crate) opacity: f32,
+    pub(crate) texture: f32,
+    half_width: f32,
+    /// Darkness at which a stroke of each order begins, for both families; the first is for order 0.
+    begins: [[f32; MOST_LEVELS]; 2],
+    /// By what that changes until the next map.
+    changes: [[f32; MOST_LEVELS]; 2],
+    /// Darkness in which a stroke grows to its width.
+    ramp: f32,
+    /// Nothing is laid on what is lighter.
+    pub(crate) lightest: f32,
+}
+
+impl Hatching {
+    /// Reads what parameters say of strokes; nothing for none. Maps that are in `before` are not baked again.
+    pub(crate) fn of(
+        settings: &Settings,
+        declared: &[Parameter],
+        before: &[Arc<Self>],
+    ) -> Result<Option<Arc<Self>>, HatchError> {
+        let set = match settings.text(declared, "hatch") {
+            "pencil" => Set::Pencil,
+            "ink" => Set::Ink,
+            "dots" => Set::Dots,
+            "images" => Set::Images,
+            _ => return Ok(None),
+        };
+        let float = |name: &str| settings.float(declared, name) as f32;
+        let names = if set == Set::Images { settings.text(declared, "hatch.images") } else { "" };
+        let files: Vec<&str> = names.split(',').map(str::trim).filter(|f| !f.is_empty()).collect();
+        if set == Set::Images && (files.is_empty() || files.len() > 64) {
+            return Err(HatchError(format!("hatch.images: name 1 to 64 pictures, not {}", files.len())));
+        }
+        let count = match set {
+            Set::Pencil | Set::Ink => 4,
+            Set::Dots => 1,
+            Set::Images => files.len(),
+        };
+        let thresholds = thresholds(settings.text(declared, "hatch.thresholds"), set, count)?;
+        let baked = if set == Set::Images { &thresholds[..] } else { &[] };
+        let source =
+            Source { set, images: names.to_owned(), thresholds: baked.iter().map(|t| t.to_bits()).collect() };
+        let levels = match before.iter().find(|b| b.source == source) {
+            Some(same) => same.levels.clone(),
+            None if set == Set::Images => bake::images(&pictures(&files)?, &thresholds).into(),
+            None => bake::strokes(set).into(),
+        };
+        let sticks = match settings.text(declared, "hatch.mapping") {
+            "uv" => Sticks::Uv,
+            "screen" => Sticks::Screen,
+            _ => Sticks::Triplanar,
+        };
+        let [begins, changes] = orders(&thresholds, set);
+        let (ramp, thickness) = match set {
+            Set::Pencil => (0.16, 0.5),
+            Set::Ink => (0.1, 0.5),
+            // A dot grows with all the darkness that is left: it is a screen.
+            Set::Dots => (1.0 - thresholds[0], 2.4),
+            Set::Images => (0.1, 0.5),
+        };
+        Ok(Some(Arc::new(Self {
+            source,
+            levels,
+            across: bake::across(set),
+            set,
+            sticks,
+            scale: float("hatch.scale"),
+            color: settings.color(declared, "hatch.color"),
+            own: float("hatch.own"),
+            opacity: float("hatch.opacity"),
+            texture: float("hatch.texture"),
+            half_width: float("hatch.width") * thickness,
+            begins,
+            changes,
+            ramp: 1.0 / ramp.max(0.01),
+            lightest: thresholds.iter().fold(f32::MAX, |a, &b| a.min(b))
+                - if set == Set::Images { 0.06 } else { 0.0 },
+        })))
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        self.levels.iter().map(|l| l.texels.len() as u64 * 4).sum()
+    }
+
+    /// Returns how much of eight pixels strokes cover, at places of the pattern (1 is its period), on so much darkness.
+    /// `density` is how many texels of the largest map a pixel is wide.
+    #[expect(clippy::needless_range_loop, reason = "several arrays are read and written lane by lane")]
+    #[inline(always)]
+    pub(crate) fn ink(&self, u: F32x8, v: F32x8, density: F32x8, darkness: F32x8) -> F32x8 {
+        let last = self.levels.len() as i32 - 1;
+        let repeats_near = self.set != Set::Images;
+        // The exponent of the density is the map, its mantissa the way to the next one.
+        let bounded = density.max(F32x8::splat(2f32.powi(-20))).min(F32x8::splat(2f32.powi(20)));
+        let (mut index, mut within, mut way, mut beyond) =
+            ([0i32; LANES], F32x8::ZERO, F32x8::ZERO, F32x8::ZERO);
+        let (mut size, mut repeats) = (F32x8::ZERO, F32x8::ZERO);
+        for i in 0..LANES {
+            let bits = bounded.0[i].to_bits();
+            let halvings = (bits >> 23) as i32 - 127;
+            let mantissa = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000);
+            let is_beyond = halvings > last;
+            index[i] = halvings.clamp(0, last);
+            size.0[i] = (EDGE >> index[i]) as f32;
+            let far = f32::from_bits((((halvings - last).max(0) + 127) as u32) << 23);
+            within.0[i] = if is_beyond { mantissa * far } else { mantissa };
+            way.0[i] = if is_beyond { 0.0 } else { mantissa - 1.0 };
+            beyond.0[i] = if is_beyond { 2.0 / (mantissa * far) } else { 1.0 };
+            // Nearer than the largest map the pattern repeats more often: every other of its strokes lies where they
+            // lay. Pictures have no such strokes.
+            let near = if repeats_near { -halvings.min(0) } else { 0 };
+            repeats.0[i] = f32::from_bits(((near + 127) as u32) << 23);
+        }
+        let half = F32x8::splat(0.5);
+        let (x, y) = (u * repeats * size, v * repeats * size);
+        let mut orders = [0u32; LANES];
+        let mut distances = [F32x8::ZERO; 2];
+        if let Some(across) = self.across {
+            // Strokes are straight over a texel: what lies between its middle and the place is added.
+            let (mut right, mut down) = (F32x8::ZERO, F32x8::ZERO);
+            for i in 0..LANES {
+                let (x0, y0) = (x.0[i].floor(), y.0[i].floor());
+                (right.0[i], down.0[i]) = (x.0[i] - x0 - 0.5, y.0[i] - y0 - 0.5);
+                let level = &self.levels[index[i] as usize];
+                let mask = level.size as i32 - 1;
+                orders[i] = level.texels[((y0 as i32 & mask) << level.shift | (x0 as i32 & mask)) as usize];
+            }
+            for (family, distance) in distances.iter_mut().enumerate() {
+                let mut stored = F32x8::ZERO;
+                for i in 0..LANES {
+                    stored.0[i] = (orders[i] >> (16 * family) & 255) as f32;
+                }
+                let [a, b] = across[family].map(F32x8::splat);
+                let middle = (stored - F32x8::splat(MIDDLE)) * F32x8::splat(1.0 / SIGNED_STEPS);
+                *distance = (middle + right * a + down * b).abs();
+            }
+        } else {
+            let mut sums = [0u32; LANES];
+            for i in 0..LANES {
+                let level = &self.levels[index[i] as usize];
+                (sums[i], orders[i]) = level.between(x.0[i] - 0.5, y.0[i] - 0.5);
+            }
+            for (family, distance) in distances.iter_mut().enumerate() {
+                for i in 0..LANES {
+                    distance.0[i] = (sums[i] >> (16 * family) & 0xffff) as f32 * (1.0 / (256.0 * STEPS));
+                }
+            }
+        }
+        let (zero, one, ramp) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(self.ramp));
+        if self.set == Set::Images {
+            let threshold = distances[0] * F32x8::splat(1.25 * STEPS / 255.0);
+            return ((darkness - threshold) * ramp + half).max(zero).min(one);
+        }
+        let thickness = F32x8::splat(self.half_width) * beyond;
+        let pixels = F32x8::splat(1.0) / within;
+        let mut clear = one;
+        for family in 0..2 {
+            let (mut begin, mut change, mut thins) = (zero, zero, one);
+            for i in 0..LANES {
+                let order = (orders[i] >> (8 + 16 * family) & 7) as usize;
+                begin.0[i] = self.begins[family][order];
+                change.0[i] = self.changes[family][order];
+                thins.0[i] = if order == 0 { 1.0 - way.0[i] } else { 1.0 };
+            }
+            let grown = ((darkness - begin - change * way) * ramp).max(zero).min(one);
+            let grown = if self.set == Set::Dots { grown.sqrt() } else { grown };
+            let reach = thickness * grown * thins;
+            // A stroke thinner than a pixel covers as much of it as it is wide.
+            let most = (reach + reach).min(one);
+            let covered = (reach + half - distances[family] * pixels).max(zero).min(most);
+            clear = clear * (one - covered);
+        }
+        one - clear
+    }
+}
+
+/// Reads thresholds, or spreads them.
+fn thresholds(text: &str, set: Set, count: usize) -> Result<Vec<f32>, HatchError> {
+    let given: Vec<&str> = text.split(',').map(str::trim).filter(|t| !t.is_empty()).collect();
+    if given.is_empty() {
+        let (first, last) = match set {
+            Set::Pencil => (0.22, 0.82),
+            Set::Ink => (0.3, 0.86),
+            Set::Dots => (0.35, 0.35),
+            Set::Images => (0.15, 0.85),
+        };
+        let step = (last - first) / (count.max(2) - 1) as f32;
+        return Ok((0..count).map(|i| first + step * i as f32).collect());
+    }
+    let parse = |t: &&str| t.parse::<f32>().ok().filter(|t| (0.0..=1.0).contains(t));
+    let read: Option<Vec<f32>> = given.iter().map(parse).collect();
+    let Some(read) = read else {
+        return Err(HatchError(format!(
+            "hatch.thresholds: `{text}`: write numbers from 0 to 1, separated by commas"
+        )));
+    };
+    let most = if set == Set::Images { count } else { MOST_LEVELS };
+    if read.len() > most || (set == Set::Images && read.len() < count) {
+        let wanted = if set == Set::Images {
+            format!("{count}, one for each picture")
+        } else {
+            format!("at most {most}")
+        };
+        return Err(HatchError(format!("hatch.thresholds: {} numbers: write {wanted}", read.len())));
+    }
+    Ok(read)
+}
+
+/// Returns at which darkness strokes of each order begin, for the two families, and by what that changes on the way to
+/// the next map. The first half of the thresholds is that of the first family; the sparsest strokes come first.
+fn orders(thresholds: &[f32], set: Set) -> [[[f32; MOST_LEVELS]; 2]; 2] {
+    const NEVER: f32 = 9.0;
+    let mut sorted = thresholds.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    let middle = sorted.len().div_ceil(2);
+    let families =
+        if set == Set::Dots { [&sorted[..], &sorted[..]] } else { [&sorted[..middle], &sorted[middle..]] };
+    let (mut begins, mut changes) = ([[NEVER; MOST_LEVELS]; 2], [[0.0; MOST_LEVELS]; 2]);
+    for (family, of) in families.iter().enumerate().filter(|(_, of)| !of.is_empty()) {
+        let of_order = |order: usize| of[of.len() - 1 - order.min(of.len() - 1)];
+        for order in 0..MOST_LEVELS {
+            begins[family][order] = of_order(order);
+            changes[family][order] = if order == 0 { 0.0 } else { of_order(order - 1) - of_order(order) };
+        }
+    }
+    [begins, changes]
+}
+
+/// Reads pictures of strokes.
+fn pictures(files: &[&str]) -> Result<Vec<bake::Picture>, HatchError> {
+    let limits = Limits { texture_pixels: MOST_PIXELS, ..Limits::default() };
+    let read = |file: &&str| {
+        let refuse = |reason: String| HatchError(format!("{file}: {reason}"));
+        let length = std::fs::metadata(file).map_err(|e| refuse(e.to_string()))?.len();
+        if length > MOST_PIXELS * 8 {
+            return Err(refuse(format!("{length} bytes are too many for a picture of strokes")));
+        }
+        let bytes = std::fs::read(file).map_err(|e| refuse(e.to_string()))?;
+        let picture = decode(&bytes, file, &limits).map_err(|e| HatchError(e.to_string()))?.to_luma8();
+        Ok(bake::Picture { width: picture.width(), height: picture.height(), light: picture.into_raw() })
+    };
+    files.iter().map(read).collect()
+}
