@@ -66,7 +66,7 @@ fn middle_of_sheet(
     }
     let rise = -at(entered - 0.5 * model.step / speed) / (0.5 * model.step);
     let back = FROM.map(|from| entered - (from - half) * model.step / (speed * rise));
-    if !(rise > 0.0) || back[0] < near {
+    if rise.is_nan() || rise <= 0.0 || back[0] < near {
         return entered;
     }
     let distance = back.map(|t| half - at(t) / model.step);

@@ -96,8 +96,9 @@ impl Survey {
     }
 }
 
-/// What it takes to pass by a sample in empty space, against one that is seen.
-const EMPTY: f64 = 0.15;
+/// What it takes to pass by a sample in empty space, against one that is seen: with less a cloud is drawn in more than
+/// twice the time foretold, with more an orbital, of which little is seen, in less than half.
+const EMPTY: f64 = 0.4;
 
 /// Edge of the blocks of samples that are passed by where all of them are empty.
 const BLOCK: usize = 8;

@@ -255,7 +255,7 @@ fn rugged(count: f64) -> Setup {
         let height = 1.0 - 2.0 * (f64::from(i) + 0.5) / count;
         let (angle, around) = (f64::from(i) * 2.399_963, (1.0 - height * height).sqrt());
         let center = DVec3::new(around * angle.cos(), height, around * angle.sin());
-        let weight = if i % 2 == 0 { 0.6 } else { -0.8 };
+        let weight = if i.is_multiple_of(2) { 0.6 } else { -0.8 };
         Perturbation { weight, power: Power::Square, function: ball(center, 1.6 / count.sqrt().max(2.0)) }
     };
     let terms = (0..count as u32).map(term).collect();

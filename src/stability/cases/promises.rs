@@ -98,7 +98,8 @@ fn shuffled_ball(shuffle: f64) -> Setup {
     let shuffle = shuffle as usize;
     // A stride that has no divisor in common with the count passes each once.
     let stride = (0..shuffle).fold(1, |stride, _| {
-        let is_prime_to = |n: usize| (2..=n.min(count)).all(|d| n % d != 0 || count % d != 0);
+        let is_prime_to =
+            |n: usize| (2..=n.min(count)).all(|d| !(n.is_multiple_of(d) && count.is_multiple_of(d)));
         (stride + 2..).find(|&n| is_prime_to(n)).unwrap_or(1)
     });
     mesh.triangles = (0..count)
