@@ -160,12 +160,12 @@ mod tests {
             for (x, y) in [(0.0, 0.0), (0.11, -0.07), (-0.2, 0.13)] {
                 for lean in [0.0, 0.3, 1.0] {
                     let target = DVec3::new(x, y, 0.0);
-                    let direction = DVec3::new(-lean, 0.2 * lean, -1.0).normalize();
+                    let direction = DVec3::new(-lean, 0.2 * lean, -1.0).normalize_or_zero();
                     let origin = target - direction * 4.0;
                     let bounds = bounds(&model).clip(origin, direction).unwrap();
                     let met = cast(&model, origin, direction, bounds.0, bounds.1).unwrap();
                     assert!((met - 4.0).abs() < 1e-5, "{met} at {target}, leaning by {lean}");
-                    let normal = normal(&model, target, direction).normalize();
+                    let normal = normal(&model, target, direction).normalize_or_zero();
                     assert!(normal.dot(DVec3::Z) > 0.9999, "{normal}");
                 }
             }
