@@ -101,6 +101,11 @@ impl Bins {
         self.runs[..self.used].iter().flat_map(move |run| run.layers.of_tile(tile))
     }
 
+    /// Tells whether nothing touches a tile.
+    pub(crate) fn is_empty(&self, tile: usize) -> bool {
+        self.solid(tile).next().is_none() && self.layers(tile).next().is_none()
+    }
+
     /// Counts the triangles that are left after clipping and culling.
     pub(crate) fn triangles(&self) -> u64 {
         self.runs[..self.used].iter().map(|r| (r.solid.records.len() + r.layers.records.len()) as u64).sum()

@@ -160,6 +160,10 @@ impl<'a> Painter<'a> {
         scratch: &mut Scratch,
     ) -> u64 {
         let area = grid.area(tile);
+        if self.drawing.is_none() && self.bins.is_empty(tile) {
+            (0..area.height as u32).for_each(|row| self.background_row(&area, row, band));
+            return 0;
+        }
         // 1. Visibility: the nearest solid triangle of each pixel.
         let hides = self.drawing.is_none_or(|drawing| drawing.hides);
         let buffer = TileBuffer::of(self.bins.solid(tile).take_while(|_| hides).copied(), &area);

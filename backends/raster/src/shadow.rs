@@ -257,6 +257,10 @@ fn draw(
     threads: &dyn Threads,
 ) {
     for_each_mut(threads, tiles, 4, &|index, tile| {
+        if bins.is_empty(index) {
+            tile.fill(NO_TRIANGLE);
+            return;
+        }
         let area = grid.area(index);
         let mut buffer = TileBuffer::of(bins.solid(index).copied(), &area);
         for record in bins.layers(index) {
