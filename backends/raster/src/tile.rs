@@ -325,7 +325,10 @@ impl TileBuffer {
         // The compiler would make masked stores where something is kept or put back, and these take some processors
         // a dozen cycles each. It cannot where it does not know that both places are the same.
         let apart = std::hint::black_box(0);
+        let mut last = 0;
         for record in records {
+            debug_assert!(record.id >= last, "of equal depths the first drawn wins: ids must rise");
+            last = record.id;
             buffer.draw(&record, area, apart);
         }
         buffer
