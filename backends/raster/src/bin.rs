@@ -4,11 +4,13 @@
 //! and sorted into tiles by one thread, so bins hold the same records in the same order on any number of them.
 
 use crate::clip::clip;
-use crate::lens::Lens;
+use crate::lens::{Lens, ScreenFromObject};
 use crate::model::{Class, Model, Part, Role};
-use crate::setup::{DepthPlane, Record, STEPS, ScreenPoint};
+use crate::setup::{Corners, DepthPlane, Record, STEPS};
+use crate::sieve;
 use crate::tile::{Placed, TileGrid};
-use crate::transform::{ScreenVertex, border};
+use crate::transform::{PartOnScreen, ScreenVertices, border};
+use polyptych_core::lanes::LANES;
 use polyptych_core::parallel::{Threads, for_each_mut};
 use std::ops::Range;
 
@@ -47,7 +49,9 @@ pub(crate) struct Bins {
 /// The triangles of one run.
 #[derive(Default)]
 struct Run {
-    solid: Bin<Record>,
+    /// Solid ones that turn their outside to the viewer, and the others, which are mostly hidden.
+    facing: Bin<Record>,
+    averted: Bin<Record>,
     layers: Bin<Record>,
 }
 
@@ -61,12 +65,25 @@ pub(crate) fn run_of(count: usize, run: usize, runs: usize) -> Range<usize> {
     count * run / runs..count * (run + 1) / runs
 }
 
-/// Records, and the same once more for each tile that they touch, tile by tile.
+/// Records by tile, in the order in which they were added.
 pub(crate) struct Bin<T> {
-    pub(crate) records: Vec<T>,
-    by_tile: Vec<T>,
-    /// Where the records of a tile end in `by_tile`; they begin where those of the tile before end.
-    ends: Vec<u32>,
+    blocks: Vec<[T; BLOCK]>,
+    /// For each block the next one of its tile.
+    next: Vec<u32>,
+    tiles: Vec<List>,
+    /// Those that touch a tile, each counted once.
+    count: u64,
+}
+
+/// Records of a tile that lie together in memory.
+const BLOCK: usize = 8;
+
+/// The records of a tile: chained blocks, all but the last one full.
+#[derive(Clone, Copy, Default)]
+struct List {
+    first: u32,
+    last: u32,
+    count: u32,
 }
 
 impl Bins {
@@ -74,7 +91,7 @@ impl Bins {
     pub(crate) fn fill(
         &mut self,
         pass: &Pass<'_>,
-        vertices: &[ScreenVertex],
+        vertices: &[ScreenVertices],
         grid: &TileGrid,
         threads: &dyn Threads,
     ) {
@@ -85,42 +102,56 @@ impl Bins {
         }
         let used = self.used;
         for_each_mut(threads, &mut self.runs[..used], 1, &|i, run| {
-            run.fill(pass, vertices, run_of(triangles, i, used));
-            run.solid.sort(grid);
-            run.layers.sort(grid);
+            run.fill(pass, vertices, grid, run_of(triangles, i, used));
         });
     }
 
-    /// Lists the solid triangles of a tile.
-    pub(crate) fn solid(&self, tile: usize) -> impl Iterator<Item = &Record> {
-        self.runs[..self.used].iter().flat_map(move |run| run.solid.of_tile(tile))
+    /// Lists the solid triangles of a tile that turn their outside to the viewer, by rising ids.
+    pub(crate) fn facing(&self, tile: usize) -> impl Iterator<Item = &[Record]> {
+        self.runs[..self.used].iter().flat_map(move |run| run.facing.of_tile(tile))
+    }
+
+    /// Lists its other solid triangles.
+    pub(crate) fn averted(&self, tile: usize) -> impl Iterator<Item = &[Record]> {
+        self.runs[..self.used].iter().flat_map(move |run| run.averted.of_tile(tile))
     }
 
     /// Lists the triangles of a tile that may let light through.
     pub(crate) fn layers(&self, tile: usize) -> impl Iterator<Item = &Record> {
-        self.runs[..self.used].iter().flat_map(move |run| run.layers.of_tile(tile))
+        self.runs[..self.used].iter().flat_map(move |run| run.layers.of_tile(tile).flatten())
     }
 
     /// Tells whether nothing touches a tile.
     pub(crate) fn is_empty(&self, tile: usize) -> bool {
-        self.solid(tile).next().is_none() && self.layers(tile).next().is_none()
+        self.runs[..self.used].iter().all(|run| run.bins().iter().all(|bin| bin.tiles[tile].count == 0))
     }
 
     /// Counts the triangles that are left after clipping and culling.
     pub(crate) fn triangles(&self) -> u64 {
-        self.runs[..self.used].iter().map(|r| (r.solid.records.len() + r.layers.records.len()) as u64).sum()
+        self.runs[..self.used].iter().flat_map(Run::bins).map(|bin| bin.count).sum()
     }
 
     /// Returns the bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        self.runs.iter().map(|r| r.solid.bytes() + r.layers.bytes()).sum()
+        self.runs.iter().flat_map(Run::bins).map(Bin::bytes).sum()
     }
 }
 
 impl Run {
-    fn fill(&mut self, pass: &Pass<'_>, vertices: &[ScreenVertex], triangles: Range<usize>) {
-        self.solid.records.clear();
-        self.layers.records.clear();
+    fn bins(&self) -> [&Bin<Record>; 3] {
+        [&self.facing, &self.averted, &self.layers]
+    }
+
+    fn fill(
+        &mut self,
+        pass: &Pass<'_>,
+        vertices: &[ScreenVertices],
+        grid: &TileGrid,
+        triangles: Range<usize>,
+    ) {
+        for bin in [&mut self.facing, &mut self.averted, &mut self.layers] {
+            bin.clear(grid);
+        }
         let parts = &pass.model.parts;
         let first = parts.partition_point(|p| p.first_triangle as usize <= triangles.start);
         for part in &parts[first.saturating_sub(1)..] {
@@ -130,99 +161,138 @@ impl Run {
             }
             let end = begin + part.mesh().triangles.len();
             let local = triangles.start.max(begin) - begin..triangles.end.min(end).saturating_sub(begin);
-            self.fill_part(pass, part, vertices, local);
+            self.fill_part(&Setup::new(pass, part, vertices, grid), local);
         }
     }
 
-    fn fill_part(
-        &mut self,
-        pass: &Pass<'_>,
-        part: &Part,
-        vertices: &[ScreenVertex],
-        triangles: Range<usize>,
-    ) {
+    fn fill_part(&mut self, setup: &Setup<'_>, triangles: Range<usize>) {
+        let all = &setup.part.mesh().triangles;
+        for first in triangles.clone().step_by(LANES) {
+            let eight = &all[first..triangles.end.min(first + LANES)];
+            let mut left = sieve::may_cover(setup.vertices, eight, setup.reach);
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                self.add(setup, first + lane);
+            }
+        }
+    }
+
+    /// Sets up a triangle and puts it into the tiles that it touches.
+    fn add(&mut self, setup: &Setup<'_>, triangle: usize) {
+        let Setup { pass, part, vertices, .. } = setup;
         let mesh = part.mesh();
-        let screen_from_object = pass.lens.for_object(&part.world_from_object);
-        let vertices = &vertices[part.first_vertex..];
-        let reach = if pass.smooth { STEPS / 2 } else { 0 };
-        for triangle in triangles {
-            let slot = mesh.slot(triangle);
-            let class = part.class(pass.role, slot);
-            let records = match class {
-                Class::Nothing => continue,
-                Class::Solid => &mut self.solid.records,
-                Class::Layer => &mut self.layers.records,
+        let class = part.class(pass.role, mesh.slot(triangle));
+        if class == Class::Nothing || pass.without.is_some_and(|w| w.leaves_out(part, triangle)) {
+            return;
+        }
+        let culls = pass.culls_back || (class == Class::Layer && part.one_sided_layers);
+        let sides = part.sides(culls && pass.role == Role::Camera);
+        let id = part.first_triangle + triangle as u32;
+        let mut put = |corners: &Corners, plane: &dyn Fn() -> DepthPlane| {
+            let area = corners.area();
+            let record = if sides.draws(area) { Record::new(corners, area, plane, id, setup.reach) } else { None };
+            let Some(record) = record else { return };
+            let bin = match class {
+                Class::Layer => &mut self.layers,
+                _ if (area < 0) != part.mirrored => &mut self.facing,
+                _ => &mut self.averted,
             };
-            if pass.without.is_some_and(|w| w.leaves_out(part, triangle)) {
-                continue;
-            }
-            let culls = pass.culls_back || (class == Class::Layer && part.one_sided_layers);
-            let sides = part.sides(culls && pass.role == Role::Camera);
-            let id = part.first_triangle + triangle as u32;
-            let [a, b, c] = mesh.triangles[triangle];
-            let [a, b, c] = [&vertices[a as usize], &vertices[b as usize], &vertices[c as usize]];
-            let (all, any) = (a.beyond & b.beyond & c.beyond, a.beyond | b.beyond | c.beyond);
-            if any & border::NOWHERE != 0 || all & border::HIDING != 0 {
-                continue;
-            }
-            if any & border::CLIPPING == 0 {
-                let point = |v: &ScreenVertex| ScreenPoint { x: v.x, y: v.y, depth: v.depth };
-                let points = [point(a), point(b), point(c)];
-                let plane = || DepthPlane::through(&points);
-                records.extend(Record::new(&points, plane, id, sides, reach));
-            } else {
-                let corners = mesh.corners(triangle).map(|p| screen_from_object.apply(p.as_dvec3()));
-                clip(pass.lens, corners, |points, plane| {
-                    records.extend(Record::new(&points, || plane, id, sides, reach));
-                });
-            }
+            bin.add(setup.grid, record);
+        };
+        let indices = mesh.triangles[triangle];
+        if indices.iter().all(|&i| vertices.snapped(i).2 & border::CLIPPING == 0) {
+            let corners = vertices.corners(indices);
+            put(&corners, &|| DepthPlane::through(&corners.points));
+        } else {
+            let corners = mesh.corners(triangle).map(|p| setup.screen_from_object.apply(p.as_dvec3()));
+            clip(pass.lens, corners, |points, plane| put(&Corners::snapped(points), &|| plane));
+        }
+    }
+}
+
+/// A part about to be set up.
+struct Setup<'a> {
+    pass: &'a Pass<'a>,
+    part: &'a Part,
+    vertices: PartOnScreen<'a>,
+    grid: &'a TileGrid,
+    screen_from_object: ScreenFromObject,
+    /// How far from a pixel's center triangles may be looked at, in steps.
+    reach: i32,
+}
+
+impl<'a> Setup<'a> {
+    fn new(pass: &'a Pass<'a>, part: &'a Part, vertices: &'a [ScreenVertices], grid: &'a TileGrid) -> Self {
+        Self {
+            pass,
+            part,
+            vertices: PartOnScreen::of(vertices, part),
+            grid,
+            screen_from_object: pass.lens.for_object(&part.world_from_object),
+            reach: if pass.smooth { STEPS / 2 } else { 0 },
         }
     }
 }
 
 impl<T> Default for Bin<T> {
     fn default() -> Self {
-        Self { records: Vec::new(), by_tile: Vec::new(), ends: Vec::new() }
+        Self { blocks: Vec::new(), next: Vec::new(), tiles: Vec::new(), count: 0 }
     }
 }
 
 impl<T: Placed + Copy> Bin<T> {
-    /// Sorts the records by tile, in their order within a tile: counts, sums, places.
-    pub(crate) fn sort(&mut self, grid: &TileGrid) {
-        self.ends.clear();
-        self.ends.resize(grid.count(), 0);
-        let mut total = 0;
-        for record in &self.records {
-            grid.for_each_touched(record, |tile| {
-                self.ends[tile] += 1;
-                total += 1;
-            });
-        }
-        let mut sum = 0;
-        for end in &mut self.ends {
-            sum += *end;
-            *end = sum - *end;
-        }
-        let Some(&any) = self.records.first() else {
-            self.by_tile.clear();
-            return;
-        };
-        self.by_tile.resize(total, any);
-        for record in &self.records {
-            grid.for_each_touched(record, |tile| {
-                self.by_tile[self.ends[tile] as usize] = *record;
-                self.ends[tile] += 1;
-            });
-        }
+    /// Forgets all records.
+    pub(crate) fn clear(&mut self, grid: &TileGrid) {
+        self.blocks.clear();
+        self.next.clear();
+        self.tiles.clear();
+        self.tiles.resize(grid.count(), List::default());
+        self.count = 0;
     }
 
-    pub(crate) fn of_tile(&self, tile: usize) -> &[T] {
-        let begin = if tile == 0 { 0 } else { self.ends[tile - 1] as usize };
-        &self.by_tile[begin..self.ends[tile] as usize]
+    /// Adds a record to the tiles that it touches.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, grid: &TileGrid, record: T) {
+        let mut touches = false;
+        grid.for_each_touched(&record, |tile| {
+            touches = true;
+            let list = &mut self.tiles[tile];
+            let place = list.count as usize % BLOCK;
+            if place == 0 {
+                let block = self.blocks.len() as u32;
+                self.blocks.push([record; BLOCK]);
+                self.next.push(0);
+                if list.count == 0 {
+                    list.first = block;
+                } else {
+                    self.next[list.last as usize] = block;
+                }
+                list.last = block;
+            } else {
+                self.blocks[list.last as usize][place] = record;
+            }
+            list.count += 1;
+        });
+        self.count += u64::from(touches);
+    }
+
+    /// Lists the records of a tile, some at a time.
+    pub(crate) fn of_tile(&self, tile: usize) -> impl Iterator<Item = &[T]> {
+        let List { mut first, mut count, .. } = self.tiles[tile];
+        std::iter::from_fn(move || {
+            let some = BLOCK.min(count as usize);
+            if some == 0 {
+                return None;
+            }
+            let block = first as usize;
+            (first, count) = (self.next[block], count - some as u32);
+            Some(&self.blocks[block][..some])
+        })
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        let records = (self.records.capacity() + self.by_tile.capacity()) * size_of::<T>();
-        (records + self.ends.capacity() * 4) as u64
+        let blocks = self.blocks.capacity() * (size_of::<[T; BLOCK]>() + 4);
+        (blocks + self.tiles.capacity() * size_of::<List>()) as u64
     }
 }

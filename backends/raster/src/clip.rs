@@ -36,10 +36,10 @@ pub(crate) fn clip(
     let slope = depth_slope(lens, &corners);
     let point = |h: &Homogeneous| {
         let ahead = h.ahead.max(lens.near);
-        let divisor = lens.divisor(ahead);
+        let share = 1.0 / lens.divisor(ahead);
         ScreenPoint {
-            x: (h.x / divisor).clamp(-GUARD, right),
-            y: (h.y / divisor).clamp(-GUARD, bottom),
+            x: (h.x * share).clamp(-GUARD, right),
+            y: (h.y * share).clamp(-GUARD, bottom),
             depth: lens.depth(ahead),
         }
     };

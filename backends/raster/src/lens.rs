@@ -87,6 +87,11 @@ impl Row {
         self.slope.dot(p) + self.offset
     }
 
+    #[inline(always)]
+    fn at_all(&self, p: DVec3x8) -> F64x8 {
+        DVec3x8::splat(self.slope).dot(p) + F64x8::splat(self.offset)
+    }
+
     /// Applies the function to points that an affine map places first.
     fn after(&self, map: &DAffine3, origin: DVec3) -> Self {
         Self {
@@ -211,8 +216,7 @@ impl Lens {
     /// Returns columns, rows and distances ahead of eight points relative to the origin.
     #[inline(always)]
     pub(crate) fn places(&self, p: DVec3x8) -> [F64x8; 3] {
-        let of = |r: &Row| DVec3x8::splat(r.slope).dot(p) + F64x8::splat(r.offset);
-        let (column, row, ahead) = (of(&self.column), of(&self.row), of(&self.ahead));
+        let (column, row, ahead) = (self.column.at_all(p), self.row.at_all(p), self.ahead.at_all(p));
         match self.rays {
             Rays::Central => [column / ahead, row / ahead, ahead],
             Rays::Parallel => [column, row, ahead],
@@ -253,6 +257,16 @@ impl Lens {
         match self.rays {
             Rays::Central => ahead,
             Rays::Parallel => 1.0,
+        }
+    }
+
+    /// Returns divisors and depths of eight distances ahead.
+    #[inline(always)]
+    pub(crate) fn divisors_and_depths(&self, ahead: F64x8) -> (F64x8, F64x8) {
+        let (one, farthest) = (F64x8::splat(1.0), F64x8::splat(self.farthest));
+        match self.rays {
+            Rays::Central => (ahead, one / ahead - farthest),
+            Rays::Parallel => (one, -ahead - farthest),
         }
     }
 
@@ -321,6 +335,12 @@ impl OnRays {
 impl ScreenFromObject {
     pub(crate) fn apply(&self, p: DVec3) -> Homogeneous {
         Homogeneous { x: self.column.at(p), y: self.row.at(p), ahead: self.ahead.at(p) }
+    }
+
+    /// Returns columns, rows and distances ahead of eight points, before division.
+    #[inline(always)]
+    pub(crate) fn apply_all(&self, p: DVec3x8) -> [F64x8; 3] {
+        [self.column.at_all(p), self.row.at_all(p), self.ahead.at_all(p)]
     }
 }
 

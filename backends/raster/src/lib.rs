@@ -8,6 +8,7 @@
 //!  lens       camera -> rows that take points to pixels, and rays back
 //!  transform  every vertex once -> column, row, depth
 //!  clip       what reaches behind the eye or beyond the guard band
+//!  sieve      eight triangles at once: which of them cover no pixel
 //!  setup      corners snapped to 24.8 bits, exact edges, depth plane
 //!  bin        records sorted into tiles of 64x32 pixels
 //!  tile       spans of covered pixels; nearest triangle of each: the visibility buffer
@@ -60,6 +61,7 @@ mod plan;
 mod renderer;
 mod setup;
 mod shadow;
+mod sieve;
 mod smooth;
 mod strokes;
 #[cfg(test)]

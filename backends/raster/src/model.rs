@@ -3,6 +3,7 @@
 use crate::setup::Sides;
 use glam::{DAffine3, DMat3, DVec3, Mat3, Vec3};
 use polyptych_core::convert::MeshModel;
+use polyptych_core::lanes::LANES;
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{AlphaMode, Material, Mesh, Object, Scene, Shape};
 use std::sync::Arc;
@@ -12,7 +13,8 @@ pub(crate) struct Model {
     /// By rising index of their objects.
     pub(crate) parts: Vec<Part>,
     pub(crate) triangles: u32,
-    pub(crate) vertices: usize,
+    /// Eights of vertices: each part begins with one of its own.
+    pub(crate) eights: usize,
     pub(crate) bounds: Aabb,
     /// Largest coordinate that went into a corner: what rounding errors are measured by.
     pub(crate) reach: f64,
@@ -20,7 +22,7 @@ pub(crate) struct Model {
 
 impl Default for Model {
     fn default() -> Self {
-        Self { parts: Vec::new(), triangles: 0, vertices: 0, bounds: Aabb::EMPTY, reach: 0.0 }
+        Self { parts: Vec::new(), triangles: 0, eights: 0, bounds: Aabb::EMPTY, reach: 0.0 }
     }
 }
 
@@ -37,7 +39,7 @@ pub(crate) struct Part {
     /// Whether the transform turns the winding over.
     pub(crate) mirrored: bool,
     pub(crate) first_triangle: u32,
-    pub(crate) first_vertex: usize,
+    pub(crate) first_eight: usize,
     /// In the world.
     pub(crate) bounds: Aabb,
     /// Largest coordinate that went into a corner.
@@ -135,7 +137,7 @@ impl Model {
         let Some(triangles) = self.triangles.checked_add(count).filter(|&t| t < u32::MAX) else {
             return false;
         };
-        let vertices = mesh.positions.len();
+        let eights = mesh.positions.len().div_ceil(LANES);
         let matrix = object.world_from_object.matrix3;
         let (bounds, reach) = match before
             .filter(|b| b.source.is(&source) && b.world_from_object == object.world_from_object)
@@ -152,7 +154,7 @@ impl Model {
             world_from_normal: normal_matrix(&matrix),
             mirrored: matrix.determinant() < 0.0,
             first_triangle: self.triangles,
-            first_vertex: self.vertices,
+            first_eight: self.eights,
             bounds,
             reach,
             classes: classes(scene, object),
@@ -163,7 +165,7 @@ impl Model {
             source,
         });
         self.triangles = triangles;
-        self.vertices += vertices;
+        self.eights += eights;
         true
     }
 

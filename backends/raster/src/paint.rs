@@ -166,7 +166,8 @@ impl<'a> Painter<'a> {
         }
         // 1. Visibility: the nearest solid triangle of each pixel.
         let hides = self.drawing.is_none_or(|drawing| drawing.hides);
-        let buffer = TileBuffer::of(self.bins.solid(tile).take_while(|_| hides).copied(), &area);
+        let buffer =
+            if hides { TileBuffer::of(self.bins, tile, &area, [0; 2]) } else { TileBuffer::new() };
         // 2. What light may pass through, in front of it. It hides no line.
         scratch.fragments.clear();
         for record in self.bins.layers(tile).take_while(|_| self.drawing.is_none()) {

@@ -16,7 +16,7 @@ use crate::shadow::{Before, MapSizes, Shadows};
 use crate::smooth;
 use crate::strokes::Strokes;
 use crate::tile::TileGrid;
-use crate::transform::{ScreenVertex, transform};
+use crate::transform::{ScreenVertices, transform};
 use polyptych_core::camera::Camera;
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Framebuffer};
@@ -82,7 +82,7 @@ struct Ready {
 /// Buffers that live from frame to frame.
 #[derive(Default)]
 struct Scratch {
-    vertices: Vec<ScreenVertex>,
+    vertices: Vec<ScreenVertices>,
     bins: Bins,
     strokes: Strokes,
     bands: Vec<Mutex<paint::Scratch>>,
@@ -376,7 +376,7 @@ impl Scratch {
 
     fn bytes(&self) -> u64 {
         let bands: usize = self.bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
-        (self.vertices.capacity() * size_of::<ScreenVertex>() + bands) as u64
+        (self.vertices.capacity() * size_of::<ScreenVertices>() + bands) as u64
             + self.bins.bytes()
             + self.strokes.bytes()
             + self.faces.bytes()
@@ -384,7 +384,7 @@ impl Scratch {
 }
 
 type Buffers<'a> =
-    (&'a mut Vec<ScreenVertex>, &'a mut Bins, &'a mut Strokes, &'a mut Vec<Mutex<paint::Scratch>>);
+    (&'a mut Vec<ScreenVertices>, &'a mut Bins, &'a mut Strokes, &'a mut Vec<Mutex<paint::Scratch>>);
 
 /// The pipeline.
 fn draw(

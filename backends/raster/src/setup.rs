@@ -32,6 +32,41 @@ pub(crate) enum Sides {
     Clockwise,
 }
 
+impl Sides {
+    /// Tells whether a triangle of such an [area](Corners::area) is drawn.
+    #[inline(always)]
+    pub(crate) fn draws(self, area: i64) -> bool {
+        match self {
+            Self::Both => area != 0,
+            Self::CounterClockwise => area < 0,
+            Self::Clockwise => area > 0,
+        }
+    }
+}
+
+/// The corners of a triangle on the picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Corners {
+    pub(crate) points: [ScreenPoint; 3],
+    /// In steps.
+    pub(crate) x: [i32; 3],
+    pub(crate) y: [i32; 3],
+}
+
+impl Corners {
+    pub(crate) fn snapped(points: [ScreenPoint; 3]) -> Self {
+        let steps = f64::from(STEPS);
+        Self { points, x: points.map(|p| round(p.x * steps)), y: points.map(|p| round(p.y * steps)) }
+    }
+
+    /// Returns twice the area in steps; negative where the corners run counter-clockwise (rows grow downward).
+    #[inline(always)]
+    pub(crate) fn area(&self) -> i64 {
+        let (x, y) = (&self.x, &self.y);
+        i64::from(x[1] - x[0]) * i64::from(y[2] - y[0]) - i64::from(x[2] - x[0]) * i64::from(y[1] - y[0])
+    }
+}
+
 /// A triangle ready to be drawn, in 64 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record {
@@ -79,63 +114,22 @@ fn last_pixel(v: &[i32; 3]) -> i32 {
     (v[0].max(v[1]).max(v[2]) - STEPS / 2) >> 8
 }
 
-/// Tells whether a triangle of positive area whose box has few pixel centers covers one of them; most triangles that
-/// are smaller than a pixel do not. Yes for larger ones.
-#[inline(always)]
-fn covers_any(x: &[i32; 3], y: &[i32; 3]) -> bool {
-    let (x0, x1, y0, y1) = (first_pixel(x), last_pixel(x), first_pixel(y), last_pixel(y));
-    if (x1 - x0 + 1) * (y1 - y0 + 1) > FEW_PIXELS {
-        return true;
-    }
-    for row in y0..=y1 {
-        for column in x0..=x1 {
-            let (px, py) = ((column << 8) + STEPS / 2, (row << 8) + STEPS / 2);
-            let mut inside = true;
-            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-                let (by_column, by_row) = (i64::from(y[a] - y[b]), i64::from(x[b] - x[a]));
-                let is_top_or_left = by_column > 0 || (by_column == 0 && by_row > 0);
-                let value = by_column * i64::from(px - x[a]) + by_row * i64::from(py - y[a]);
-                inside &= value >= i64::from(!is_top_or_left);
-            }
-            if inside {
-                return true;
-            }
-        }
-    }
-    false
-}
-
-/// Most pixel centers that are tried one by one.
-const FEW_PIXELS: i32 = 4;
-
 impl Record {
-    /// Snaps and orders the corners; nothing where no area is left or the side is not drawn.
+    /// Orders the corners; nothing where no pixel can be covered.
     ///
     /// Triangles seen from the edge are kept while their snapped corners have area: without them pixels between
     /// their neighbors would stay open.
     ///
     /// `reach` is how far from a pixel's center it may be looked at, in steps.
+    #[inline(always)]
     pub(crate) fn new(
-        points: &[ScreenPoint; 3],
+        corners: &Corners,
+        area: i64,
         plane: impl FnOnce() -> DepthPlane,
         id: u32,
-        sides: Sides,
         reach: i32,
     ) -> Option<Self> {
-        let steps = f64::from(STEPS);
-        let [a, b, c] = points;
-        let mut x = [round(a.x * steps), round(b.x * steps), round(c.x * steps)];
-        let mut y = [round(a.y * steps), round(b.y * steps), round(c.y * steps)];
-        let area =
-            i64::from(x[1] - x[0]) * i64::from(y[2] - y[0]) - i64::from(x[2] - x[0]) * i64::from(y[1] - y[0]);
-        let drawn = match sides {
-            Sides::Both => area != 0,
-            Sides::CounterClockwise => area < 0,
-            Sides::Clockwise => area > 0,
-        };
-        if !drawn {
-            return None;
-        }
+        let Corners { points, mut x, mut y } = *corners;
         let pixels = |v: &[i32; 3]| first_pixel(&v.map(|v| v - reach)) <= last_pixel(&v.map(|v| v + reach));
         if !(pixels(&x) && pixels(&y)) {
             return None;
@@ -144,15 +138,12 @@ impl Record {
             x.swap(1, 2);
             y.swap(1, 2);
         }
-        if reach == 0 && !covers_any(&x, &y) {
-            return None;
-        }
         // The plane is that of the corners before they were snapped, found for what is drawn only.
-        let (first, plane) = (points[0], plane());
+        let (first, plane, steps) = (points[0], plane(), f64::from(STEPS));
         let depth = first.depth
             + plane.by_column * (f64::from(x[0]) / steps - first.x)
             + plane.by_row * (f64::from(y[0]) / steps - first.y);
-        let depths = [a.depth, b.depth, c.depth];
+        let depths = points.map(|p| p.depth);
         Some(Self {
             x,
             y,

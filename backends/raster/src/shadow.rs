@@ -11,7 +11,7 @@ use crate::lens::{Lens, Rays, cube_axes};
 use crate::light::Lamp;
 use crate::model::{Model, Part, Role};
 use crate::tile::{NO_TRIANGLE, TILE_PIXELS, TileBuffer, TileGrid};
-use crate::transform::{ScreenVertex, transform};
+use crate::transform::{ScreenVertices, transform};
 use glam::{DMat3, DVec3, Vec3};
 use polyptych_core::math::{Aabb, orthonormal_basis};
 use polyptych_core::parallel::{Threads, for_each_mut};
@@ -103,7 +103,7 @@ impl Shadows {
         lamps: &[Lamp],
         sizes: MapSizes,
         before: Option<Before>,
-        vertices: &mut Vec<ScreenVertex>,
+        vertices: &mut Vec<ScreenVertices>,
         bins: &mut Bins,
         control: &Control<'_>,
     ) -> Result<Self, Cancelled> {
@@ -262,7 +262,7 @@ fn draw(
             return;
         }
         let area = grid.area(index);
-        let mut buffer = TileBuffer::of(bins.solid(index).copied(), &area);
+        let mut buffer = TileBuffer::of(bins, index, &area, [0; 2]);
         for record in bins.layers(index) {
             let face = Face::new(scene, pass.model, pass.lens, record.id);
             buffer.draw_where(record, &area, |x, y| {

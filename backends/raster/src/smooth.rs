@@ -60,8 +60,7 @@ impl Smooth {
         self.layers.resize_with(places.len(), Vec::new);
         let mut mixed = [false; TILE_PIXELS];
         for (i, place) in places.iter().enumerate() {
-            let moved = bins.solid(tile).map(|record| record.seen_from(*place));
-            let buffer = TileBuffer::of(moved, area);
+            let buffer = TileBuffer::of(bins, tile, area, *place);
             let of_place = &mut self.layers[i];
             of_place.clear();
             for record in bins.layers(tile) {

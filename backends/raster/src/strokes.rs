@@ -11,7 +11,7 @@ use crate::lens::{GUARD, Homogeneous, Lens};
 use crate::lines::{Edge, Lines};
 use crate::model::{Model, Part};
 use crate::tile::{NO_TRIANGLE, Placed, TILE_PIXELS, TILE_WIDTH, TileArea, TileGrid};
-use crate::transform::{ScreenVertex, border};
+use crate::transform::{PartOnScreen, ScreenVertices, border};
 use glam::DVec2;
 use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::Scene;
@@ -78,7 +78,7 @@ impl Strokes {
         lines: &Lines,
         model: &Model,
         lens: &Lens,
-        vertices: &[ScreenVertex],
+        vertices: &[ScreenVertices],
         (culls_back, hides): (bool, bool),
         threads: &dyn Threads,
     ) {
@@ -92,31 +92,32 @@ impl Strokes {
         }
         let used = self.used;
         for_each_mut(threads, &mut self.runs[..used], 1, &|i, run| {
-            run.records.clear();
+            run.clear(&grid);
             let of_run = run_of(lines.count(), i, used);
             let mut first = 0;
             for (index, part) in model.parts.iter().enumerate() {
                 let edges = lines.of_part(index);
                 let local =
                     of_run.start.max(first) - first..of_run.end.clamp(first, first + edges.len()) - first;
-                let vertices = &vertices[part.first_vertex..];
+                let vertices = PartOnScreen::of(vertices, part);
                 for (k, edge) in edges.get(local.clone()).unwrap_or(&[]).iter().enumerate() {
                     if culls_back && looks_away(part, edge, lens) {
                         continue;
                     }
                     if let Some([a, b]) = ends(lens, part, edge, vertices) {
                         let id = [index as u32, (local.start + k) as u32];
-                        run.records.extend(Stroke::between(a, b, id));
+                        if let Some(stroke) = Stroke::between(a, b, id) {
+                            run.add(&grid, stroke);
+                        }
                     }
                 }
                 first += edges.len();
             }
-            run.sort(&grid);
         });
     }
 
     fn of_tile(&self, tile: usize) -> impl Iterator<Item = &Stroke> {
-        self.runs[..self.used].iter().flat_map(move |run| run.of_tile(tile))
+        self.runs[..self.used].iter().flat_map(move |run| run.of_tile(tile).flatten())
     }
 
     pub(crate) fn bytes(&self) -> u64 {
@@ -260,14 +261,15 @@ fn looks_away(part: &Part, edge: &Edge, lens: &Lens) -> bool {
 }
 
 /// Returns the ends of a line on the picture with their depths, clipped.
-fn ends(lens: &Lens, part: &Part, edge: &Edge, vertices: &[ScreenVertex]) -> Option<[(DVec2, f64); 2]> {
-    let [a, b] = edge.ends.map(|i| &vertices[i as usize]);
-    let (all, any) = (a.beyond & b.beyond, a.beyond | b.beyond);
+fn ends(lens: &Lens, part: &Part, edge: &Edge, vertices: PartOnScreen<'_>) -> Option<[(DVec2, f64); 2]> {
+    let [(_, _, a), (_, _, b)] = edge.ends.map(|i| vertices.snapped(i));
+    let (all, any) = (a & b, a | b);
     if any & border::NOWHERE != 0 || all & border::HIDING != 0 {
         return None;
     }
     if any & border::CLIPPING == 0 {
-        return Some([a, b].map(|v| (DVec2::new(v.x, v.y), v.depth)));
+        let point = edge.ends.map(|i| vertices.point(i));
+        return Some(point.map(|p| (DVec2::new(p.x, p.y), p.depth)));
     }
     let screen_from_object = lens.for_object(&part.world_from_object);
     let place = |i: u32| screen_from_object.apply(part.mesh().positions[i as usize].as_dvec3());

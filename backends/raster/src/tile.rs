@@ -5,6 +5,7 @@
 //! convex, so a row of it is one span; its ends are found by exact division. (J. Pineda, *A parallel algorithm
 //! for polygon rasterization*, SIGGRAPH 1988.)
 
+use crate::bin::Bins;
 use crate::setup::{Record, STEPS};
 use polyptych_core::lanes::{F32x8, F64x8, I32x8, LANES, Mask8};
 
@@ -297,9 +298,61 @@ impl Spans {
     }
 }
 
+/// The least depths of blocks of a tile.
+struct Coarse([f32; COARSE_COLUMNS * COARSE_ROWS]);
+
+/// Pixels of an edge of a coarse block.
+const COARSE: i32 = 8;
+const COARSE_COLUMNS: usize = TILE_WIDTH as usize / COARSE as usize;
+const COARSE_ROWS: usize = TILE_HEIGHT as usize / COARSE as usize;
+
+impl Coarse {
+    #[inline(always)]
+    fn of(buffer: &TileBuffer) -> Self {
+        let mut coarse = Self([0.0; COARSE_COLUMNS * COARSE_ROWS]);
+        for (i, least) in coarse.0.iter_mut().enumerate() {
+            let (row, column) = (i / COARSE_COLUMNS * COARSE as usize, i % COARSE_COLUMNS * COARSE as usize);
+            let line = |y: usize| F32x8::load(&buffer.depth[(row + y) * TILE_WIDTH as usize + column..]);
+            let mut all = line(0);
+            for y in 1..COARSE as usize {
+                all = all.min(line(y));
+            }
+            *least = all.0.iter().fold(f32::INFINITY, |a, &b| a.min(b));
+        }
+        coarse
+    }
+
+    /// Tells whether a triangle is behind all depths around it.
+    #[inline(always)]
+    fn hides(&self, record: &Record, area: &TileArea) -> bool {
+        let Some(pixels) = Pixels::of(record, area) else { return true };
+        let (first, last) = ((pixels.x0 - area.x) / COARSE, (pixels.x1 - area.x) / COARSE);
+        let rows = (pixels.y0 - area.y) / COARSE..=(pixels.y1 - area.y) / COARSE;
+        rows.flat_map(|row| (first..=last).map(move |column| (row as usize, column as usize)))
+            .all(|(row, column)| record.nearest < self.0[row * COARSE_COLUMNS + column])
+    }
+}
+
+/// Tells which ids are above one.
+#[inline(always)]
+fn are_above(ids: Mask8, id: u32) -> Mask8 {
+    let mut above = Mask8::NONE;
+    for lane in 0..LANES {
+        above.0[lane] = if ids.0[lane] > id { u32::MAX } else { 0 };
+    }
+    above
+}
+
 impl TileBuffer {
-    /// Draws solid triangles, listed by rising ids: of equal depths the lowest wins.
-    pub(crate) fn of(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
+    /// Nothing is visible.
+    pub(crate) fn new() -> Self {
+        Self { depth: [f32::NEG_INFINITY; TILE_PIXELS], id: [NO_TRIANGLE; TILE_PIXELS] }
+    }
+
+    /// Draws the solid triangles of a tile as they are seen from places that lie so many steps from the pixels'
+    /// centers. Of equal depths the lowest id wins.
+    pub(crate) fn of(bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2]) -> Self {
+        let mut buffer = Self::new();
         #[cfg(target_arch = "x86_64")]
         if crate::wide::has_avx2() {
             #[expect(
@@ -307,46 +360,60 @@ impl TileBuffer {
                 reason = "a kernel compiled for a processor feature can only be called so"
             )]
             // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { Self::of_avx2(records, area) };
+            unsafe {
+                buffer.fill_avx2(bins, tile, area, place);
+            }
+            return buffer;
         }
-        Self::of_here(records, area)
+        buffer.fill(bins, tile, area, place);
+        buffer
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn of_avx2(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
-        Self::of_here(records, area)
+    fn fill_avx2(&mut self, bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2]) {
+        self.fill(bins, tile, area, place);
     }
 
-    /// The same in the caller's instructions.
+    /// The same in the caller's instructions. What turns its back to the viewer is mostly hidden by what does not, and
+    /// most of it is told to be by a coarse look at the depths.
     #[inline(always)]
-    fn of_here(records: impl Iterator<Item = Record>, area: &TileArea) -> Self {
-        let mut buffer = Self { depth: [f32::NEG_INFINITY; TILE_PIXELS], id: [NO_TRIANGLE; TILE_PIXELS] };
+    fn fill(&mut self, bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2]) {
         // The compiler would make masked stores where something is kept or put back, and these take some processors
         // a dozen cycles each. It cannot where it does not know that both places are the same.
         let apart = std::hint::black_box(0);
         let mut last = 0;
-        for record in records {
+        for record in bins.facing(tile).flatten() {
             debug_assert!(record.id >= last, "of equal depths the first drawn wins: ids must rise");
             last = record.id;
-            buffer.draw(&record, area, apart);
+            self.draw::<false>(&record.seen_from(place), area, apart);
         }
-        buffer
+        let mut averted = bins.averted(tile).peekable();
+        if averted.peek().is_none() {
+            return;
+        }
+        let coarse = Coarse::of(self);
+        for record in averted.flatten() {
+            let record = record.seen_from(place);
+            if !coarse.hides(&record, area) {
+                self.draw::<true>(&record, area, apart);
+            }
+        }
     }
 
-    /// Draws a solid triangle.
+    /// Draws a solid triangle. `TIES` tells whether triangles of higher ids may have been drawn before.
     #[inline(always)]
-    fn draw(&mut self, record: &Record, area: &TileArea, apart: usize) {
+    fn draw<const TIES: bool>(&mut self, record: &Record, area: &TileArea, apart: usize) {
         let Some(pixels) = Pixels::of(record, area) else { return };
         match Blocks::new(record, area, &pixels) {
-            Some(blocks) => self.draw_blocks(record, area, &pixels, &blocks, apart),
-            None => self.draw_spans(record, area, &pixels, apart),
+            Some(blocks) => self.draw_blocks::<TIES>(record, area, &pixels, &blocks, apart),
+            None => self.draw_spans::<TIES>(record, area, &pixels, apart),
         }
     }
 
     /// Draws a triangle row by row. What columns add to depths is found once for all rows.
     #[inline(always)]
-    fn draw_spans(&mut self, record: &Record, area: &TileArea, pixels: &Pixels, apart: usize) {
+    fn draw_spans<const TIES: bool>(&mut self, record: &Record, area: &TileArea, pixels: &Pixels, apart: usize) {
         let mut columns = [F64x8::ZERO; BLOCKS];
         let block = |x: i32| (x - area.x) as usize / BLOCK;
         let first = block(pixels.x0);
@@ -368,14 +435,14 @@ impl TileBuffer {
                     let before = I32x8::splat(end as i32 - 1) - I32x8::count_from(first as i32);
                     outside = (past | before).is_negative();
                 }
-                self.draw_block(at, apart, depth, outside, record.id);
+                self.draw_block::<TIES>(at, apart, depth, outside, record.id);
             }
         }
     }
 
     /// Draws a small triangle by testing all pixels of a few columns at once.
     #[inline(always)]
-    fn draw_blocks(
+    fn draw_blocks<const TIES: bool>(
         &mut self,
         record: &Record,
         area: &TileArea,
@@ -395,7 +462,7 @@ impl TileBuffer {
             for y in pixels.y0..=pixels.y1 {
                 let at = ((y - area.y) * TILE_WIDTH as i32 + x - area.x) as usize;
                 let depth = record.hold_all(F64x8::splat(record.depth_of_row(y)) + columns);
-                self.draw_block(at, apart, depth, (a | b | c | within).is_negative(), record.id);
+                self.draw_block::<TIES>(at, apart, depth, (a | b | c | within).is_negative(), record.id);
                 (a, b, c) = (a + down_a, b + down_b, c + down_c);
             }
             first += BLOCK as i32;
@@ -405,9 +472,13 @@ impl TileBuffer {
     /// Draws eight pixels of a triangle where they are not outside of it, and nearer than what is there. `apart` is
     /// zero; see [`TileBuffer::of_here`].
     #[inline(always)]
-    fn draw_block(&mut self, at: usize, apart: usize, depth: F32x8, outside: Mask8, id: u32) {
+    fn draw_block<const TIES: bool>(&mut self, at: usize, apart: usize, depth: F32x8, outside: Mask8, id: u32) {
         let (old, old_ids) = (F32x8::load(&self.depth[at..]), Mask8::load(&self.id[at..]));
-        let wins = depth.above(old) & !outside;
+        let mut wins = depth.above(old);
+        if TIES {
+            wins = wins | (depth.equal(old) & are_above(old_ids, id));
+        }
+        let wins = wins & !outside;
         let to = at + apart..at + apart + BLOCK;
         wins.pick(depth, old).store(&mut self.depth[to.clone()]);
         self.id[to].copy_from_slice(&wins.pick_bits(Mask8([id; BLOCK]), old_ids).0);

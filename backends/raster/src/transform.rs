@@ -1,27 +1,35 @@
 //! Where on the picture is every vertex?
 
 use crate::lens::{GUARD, Lens, ScreenFromObject};
-use crate::model::Model;
+use crate::model::{Model, Part};
+use crate::setup::{Corners, STEPS, ScreenPoint};
 use glam::Vec3;
+use polyptych_core::lanes::{F64x8, LANES, Mask8, Vec3x8};
 use polyptych_core::parallel::{Threads, for_each_mut};
 
-/// Vertices that one thread takes at a time.
-const GRAIN: usize = 2048;
+/// Eights of vertices that one thread takes at a time.
+const GRAIN: usize = 256;
 
-/// A vertex on the picture.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ScreenVertex {
-    /// Column in pixels.
-    pub(crate) x: f64,
-    /// Row in pixels.
-    pub(crate) y: f64,
+/// Eight vertices on the picture. What decides about most triangles comes first in memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScreenVertices {
+    /// In steps.
+    column: [i32; LANES],
+    row: [i32; LANES],
+    /// Which of the borders below each is beyond.
+    beyond: [u32; LANES],
+    /// In pixels.
+    x: [f64; LANES],
+    y: [f64; LANES],
     /// See [`Lens::depth`].
-    pub(crate) depth: f64,
-    /// Which of the borders below it is beyond.
-    pub(crate) beyond: u32,
+    depth: [f64; LANES],
 }
 
-/// Bits of [`ScreenVertex::beyond`].
+/// The vertices of a part on the picture.
+#[derive(Clone, Copy)]
+pub(crate) struct PartOnScreen<'a>(&'a [ScreenVertices]);
+
+/// Borders that a vertex can be beyond, one bit each.
 pub(crate) mod border {
     /// Not far enough ahead: column, row and depth mean nothing.
     pub(crate) const NEAR: u32 = 1;
@@ -39,35 +47,116 @@ pub(crate) mod border {
     pub(crate) const CLIPPING: u32 = NEAR | GUARD;
 }
 
-/// Transforms all vertices of a model, those of a part at its `first_vertex`.
-pub(crate) fn transform(model: &Model, lens: &Lens, vertices: &mut Vec<ScreenVertex>, threads: &dyn Threads) {
-    vertices.resize(model.vertices, ScreenVertex::default());
-    for part in &model.parts {
-        let screen_from_object = lens.for_object(&part.world_from_object);
-        let positions = &part.mesh().positions;
-        let of_part = &mut vertices[part.first_vertex..][..positions.len()];
-        for_each_mut(threads, of_part, GRAIN, &|i, vertex| {
-            *vertex = project(lens, &screen_from_object, positions[i]);
-        });
+impl<'a> PartOnScreen<'a> {
+    pub(crate) fn of(vertices: &'a [ScreenVertices], part: &Part) -> Self {
+        Self(&vertices[part.first_eight..])
+    }
+
+    /// Returns column and row of a vertex, in steps, and which borders it is beyond.
+    #[inline(always)]
+    pub(crate) fn snapped(&self, vertex: u32) -> (i32, i32, u32) {
+        let (eight, lane) = (&self.0[vertex as usize / LANES], vertex as usize % LANES);
+        (eight.column[lane], eight.row[lane], eight.beyond[lane])
+    }
+
+    /// Returns a vertex that is ahead.
+    #[inline(always)]
+    pub(crate) fn point(&self, vertex: u32) -> ScreenPoint {
+        let (eight, lane) = (&self.0[vertex as usize / LANES], vertex as usize % LANES);
+        ScreenPoint { x: eight.x[lane], y: eight.y[lane], depth: eight.depth[lane] }
+    }
+
+    /// Returns the corners of a triangle that is ahead.
+    #[inline(always)]
+    pub(crate) fn corners(&self, [a, b, c]: [u32; 3]) -> Corners {
+        let [p, q, r] = [self.snapped(a), self.snapped(b), self.snapped(c)];
+        let points = [self.point(a), self.point(b), self.point(c)];
+        Corners { points, x: [p.0, q.0, r.0], y: [p.1, q.1, r.1] }
     }
 }
 
-fn project(lens: &Lens, screen_from_object: &ScreenFromObject, position: Vec3) -> ScreenVertex {
-    let h = screen_from_object.apply(position.as_dvec3());
-    if !(h.x + h.y + h.ahead).is_finite() {
-        return ScreenVertex { beyond: border::NOWHERE, ..ScreenVertex::default() };
+impl ScreenVertices {
+    const NONE: Self = Self {
+        column: [0; LANES],
+        row: [0; LANES],
+        beyond: [border::NOWHERE; LANES],
+        x: [0.0; LANES],
+        y: [0.0; LANES],
+        depth: [0.0; LANES],
+    };
+
+    /// Projects up to eight points.
+    fn of(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if crate::wide::has_avx2() {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { Self::of_avx2(lens, screen_from_object, points) };
+        }
+        Self::of_here(lens, screen_from_object, points)
     }
-    if h.ahead < lens.near {
-        return ScreenVertex { beyond: border::NEAR, ..ScreenVertex::default() };
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn of_avx2(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> Self {
+        Self::of_here(lens, screen_from_object, points)
     }
-    let share = 1.0 / lens.divisor(h.ahead);
-    let (x, y) = (h.x * share, h.y * share);
-    let (width, height) = (f64::from(lens.width), f64::from(lens.height));
-    let bit = |is_beyond: bool, border: u32| if is_beyond { border } else { 0 };
-    let beyond = bit(x < 0.0, border::LEFT)
-        | bit(x > width, border::RIGHT)
-        | bit(y < 0.0, border::TOP)
-        | bit(y > height, border::BOTTOM)
-        | bit(x < -GUARD || x > width + GUARD || y < -GUARD || y > height + GUARD, border::GUARD);
-    ScreenVertex { x, y, depth: lens.depth(h.ahead), beyond }
+
+    #[inline(always)]
+    fn of_here(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> Self {
+        let mut gathered = Vec3x8::splat(Vec3::ZERO);
+        for (lane, point) in points.iter().enumerate().take(LANES) {
+            gathered.set(lane, *point);
+        }
+        let [x, y, ahead] = screen_from_object.apply_all(gathered.to_f64());
+        let is_somewhere = F64x8::splat(f64::INFINITY).above((x + y + ahead).abs());
+        let is_near = F64x8::splat(lens.near).above(ahead);
+        let (divisor, depth) = lens.divisors_and_depths(ahead);
+        let share = F64x8::splat(1.0) / divisor;
+        let (x, y) = (x * share, y * share);
+        let (width, height) = (f64::from(lens.width), f64::from(lens.height));
+        let bit = |is_beyond: Mask8, border: u32| is_beyond & Mask8([border; LANES]);
+        let at = F64x8::splat;
+        let beyond_guard = at(-GUARD).above(x)
+            | x.above(at(width + GUARD))
+            | at(-GUARD).above(y)
+            | y.above(at(height + GUARD));
+        let beyond = bit(at(0.0).above(x), border::LEFT)
+            | bit(x.above(at(width)), border::RIGHT)
+            | bit(at(0.0).above(y), border::TOP)
+            | bit(y.above(at(height)), border::BOTTOM)
+            | bit(beyond_guard, border::GUARD);
+        let beyond = is_near.pick_bits(Mask8([border::NEAR; LANES]), beyond);
+        let steps = F64x8::splat(f64::from(STEPS));
+        Self {
+            column: (x * steps).nearest().0,
+            row: (y * steps).nearest().0,
+            beyond: is_somewhere.pick_bits(beyond, Mask8([border::NOWHERE; LANES])).0,
+            x: x.0,
+            y: y.0,
+            depth: depth.0,
+        }
+    }
+}
+
+/// Transforms all vertices of a model, those of a part from its `first_eight` on.
+pub(crate) fn transform(
+    model: &Model,
+    lens: &Lens,
+    vertices: &mut Vec<ScreenVertices>,
+    threads: &dyn Threads,
+) {
+    vertices.resize(model.eights, ScreenVertices::NONE);
+    for part in &model.parts {
+        let screen_from_object = lens.for_object(&part.world_from_object);
+        let positions = &part.mesh().positions;
+        let of_part = &mut vertices[part.first_eight..][..positions.len().div_ceil(LANES)];
+        for_each_mut(threads, of_part, GRAIN, &|i, eight| {
+            let end = positions.len().min((i + 1) * LANES);
+            *eight = ScreenVertices::of(lens, &screen_from_object, &positions[i * LANES..end]);
+        });
+    }
 }

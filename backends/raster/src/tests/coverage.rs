@@ -1,7 +1,7 @@
 //! Is every pixel inside of a surface covered exactly once?
 
 use super::{Random, camera, draw, scene_of, triangle};
-use crate::setup::{DepthPlane, Record, ScreenPoint, Sides};
+use crate::setup::{Corners, DepthPlane, Record, ScreenPoint};
 use crate::tile::{Spans, TILE_WIDTH, TileGrid};
 use glam::Vec3;
 use polyptych_core::camera::{Camera, Projection};
@@ -14,8 +14,10 @@ fn count(width: u32, height: u32, triangles: &[[Corner; 3]]) -> Vec<u32> {
     let grid = TileGrid::new(width, height);
     let mut hits = vec![0; (width * height) as usize];
     for corners in triangles {
-        let points = corners.map(|(x, y)| ScreenPoint { x, y, depth: 1.0 });
-        let Some(record) = Record::new(&points, || DepthPlane::through(&points), 0, Sides::Both, 0) else {
+        let corners = Corners::snapped(corners.map(|(x, y)| ScreenPoint { x, y, depth: 1.0 }));
+        let plane = || DepthPlane::through(&corners.points);
+        let area = corners.area();
+        let Some(record) = Record::new(&corners, area, plane, 0, 0).filter(|_| area != 0) else {
             continue;
         };
         grid.for_each_touched(&record, |tile| {
