@@ -7,6 +7,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use std::hint::black_box;
 use std::sync::Arc;
 
 /// An eye with six degrees of freedom and a projection.
@@ -224,8 +225,11 @@ impl RowDirections {
         for (chunk, colors) in colors.chunks_mut(LANES).enumerate() {
             let columns = I32x8::count_from((column as usize + chunk * LANES) as i32).to_f64().round();
             let direction = first + step.scaled(columns);
-            let seen = background.colors(direction.y / direction.length()).finite();
-            colors.iter_mut().enumerate().for_each(|(lane, color)| *color = seen.get(lane));
+            // Taken apart in memory: the compiler would reckon each lane's color by itself.
+            let seen = black_box(background.colors(direction.y / direction.length()).finite());
+            for (lane, color) in colors.iter_mut().enumerate() {
+                *color = seen.get(lane);
+            }
         }
     }
 }

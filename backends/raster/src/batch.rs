@@ -3,7 +3,8 @@
 //! Eight pixels in a row that show one triangle, as most do where triangles are large, meet a [`Face`] that was set up
 //! for all of them. Others meet a triangle each.
 
-use crate::face::{Face, Met, Place};
+use crate::color::{Changes, ChangesAll, Spot};
+use crate::face::Face;
 use crate::info::Shading;
 use crate::lens::Lens;
 use crate::model::Model;
@@ -137,7 +138,7 @@ impl<'a> Batch<'a> {
         (ask, shading): (Ask, Shading),
     ) {
         if !(self.is_one && self.resolve_one(scene, model, lens, faces, (ask, shading))) {
-            self.resolve_each(scene, model, lens, faces, (ask, shading));
+            self.resolve_each(scene, model, lens, (ask, shading));
         }
         self.straighten();
     }
@@ -155,7 +156,7 @@ impl<'a> Batch<'a> {
         let face = &faces[usize::from(self.face[0])];
         let Some(met) = face.meet_all(lens, self.x, self.y) else { return false };
         self.t = met.t;
-        self.weights = met.weights;
+        self.weights = [met.weights[0].round(), met.weights[1].round()];
         let side = if met.from_within { -1.0 } else { 1.0 };
         let outward = face.outward * side;
         self.true_normal = DVec3x8::splat(outward);
@@ -168,16 +169,12 @@ impl<'a> Batch<'a> {
         self.material = [Some(material); LANES];
         self.has_one_material = true;
         if ask == Ask::Color {
-            if face.is_painted {
-                for i in 0..LANES {
-                    let place = Place { scene, model, lens, x: self.x.0[i], y: self.y.0[i] };
-                    let (color, opacity) = face.color(&place, &met.of(i));
-                    self.opacity[i] = opacity;
-                    self.color.set(i, color);
-                }
+            let part = &model.parts[face.part as usize];
+            if part.has_one_color(material) {
+                self.fill_color(material);
             } else {
-                self.opacity = [material.effective_opacity(material.opacity).min(1.0); LANES];
-                self.color = Vec3x8::splat(material.base_color);
+                let changes = face.changes(lens, self.x, self.y, &met);
+                self.paint((scene, model), &met.weights, Some(&changes));
             }
         }
         self.reach(lens);
@@ -186,25 +183,24 @@ impl<'a> Batch<'a> {
 
     /// Finds the points of pixels that show a triangle each.
     #[inline(always)]
-    fn resolve_each(
-        &mut self,
-        scene: &'a Scene,
-        model: &Model,
-        lens: &Lens,
-        faces: &[Face],
-        (ask, shading): (Ask, Shading),
-    ) {
+    fn resolve_each(&mut self, scene: &'a Scene, model: &Model, lens: &Lens, (ask, shading): (Ask, Shading)) {
         let octet = Octet::of(model, lens.origin, &self.names, self.count, shading != Shading::Flat);
-        let met = octet.meet(lens, self.x, self.y);
+        self.find_materials(scene, model);
+        let paints = ask == Ask::Color
+            && self.material[..self.count].iter().flatten().any(|material| material.texture.is_some());
+        let met = octet.meet(lens, self.x, self.y, paints);
         self.t = met.t;
         self.weights = [met.weights[0].round(), met.weights[1].round()];
         (self.true_normal, self.normal) = (met.true_normal, met.normal);
-        let (mut from_within, mut weights) = (met.from_within, met.weights);
+        let (mut weights, mut changes) = (met.weights, met.changes);
         let (mut held, mut any_held) = ([DVec3::NAN; LANES], false);
         for i in (0..self.count).filter(|&i| !met.inside.has(i)) {
             // The ray passes beside its triangle: rare, and held to it one by one.
-            let face = Face::new(scene, model, lens, self.names.id[i]);
+            let face = Face::new(model, lens, self.names.id[i]);
             let met = face.meet(lens, self.x.0[i], self.y.0[i]);
+            if let Some(changes) = &mut changes {
+                changes.set(i, face.changes_at(lens, self.x.0[i], self.y.0[i], met.t));
+            }
             self.t.0[i] = met.t;
             let [_, v, w] = met.weights;
             (weights[0].0[i], weights[1].0[i]) = (v, w);
@@ -217,29 +213,11 @@ impl<'a> Batch<'a> {
             let (normal, outward) = if met.from_within { (-normal, -outward) } else { (normal, outward) };
             self.normal.set(i, normal);
             self.true_normal.set(i, outward);
-            from_within.0[i] = if met.from_within { u32::MAX } else { 0 };
         }
-        self.find_materials(scene, model);
         if ask == Ask::Color {
-            for i in 0..self.count {
-                let Some(material) = self.material[i] else { continue };
-                let (color, opacity) = match faces.get(usize::from(self.face[i])) {
-                    Some(face) => {
-                        let [v, w] = weights.map(|w| w.0[i]);
-                        let weights = [1.0 - v - w, v, w];
-                        let (t, held) = (self.t.0[i], held[i].is_finite().then_some(held[i]));
-                        let place = Place { scene, model, lens, x: self.x.0[i], y: self.y.0[i] };
-                        face.color(&place, &Met { t, weights, from_within: from_within.has(i), held })
-                    }
-                    None => {
-                        let (part, triangle) = (self.names.part[i] as usize, self.names.triangle[i] as usize);
-                        let weights = [self.weights[0].0[i], self.weights[1].0[i]];
-                        let color = model.parts[part].tinted(material.base_color, triangle, weights);
-                        (color, material.effective_opacity(material.opacity).min(1.0))
-                    }
-                };
-                self.opacity[i] = opacity;
-                self.color.set(i, color);
+            match self.material[0].filter(|material| self.is_of_one_color(model, material)) {
+                Some(material) => self.fill_color(material),
+                None => self.paint((scene, model), &weights, changes.as_ref()),
             }
         }
         self.reach(lens);
@@ -247,6 +225,43 @@ impl<'a> Batch<'a> {
             if held[i].is_finite() {
                 self.place.set(i, held[i]);
             }
+        }
+    }
+
+    /// Tells whether all places have one color, that of a material.
+    #[inline(always)]
+    fn is_of_one_color(&self, model: &Model, material: &Material) -> bool {
+        let parts = &self.names.part[..self.count];
+        self.has_one_material && parts.iter().all(|&part| model.parts[part as usize].has_one_color(material))
+    }
+
+    /// Gives all places the color of a material.
+    #[inline(always)]
+    fn fill_color(&mut self, material: &Material) {
+        self.opacity = [material.effective_opacity(material.opacity).min(1.0); LANES];
+        self.color = Vec3x8::splat(material.base_color);
+    }
+
+    /// Finds the color of each place.
+    #[inline(always)]
+    fn paint(
+        &mut self,
+        (scene, model): (&Scene, &Model),
+        weights: &[F64x8; 2],
+        changes: Option<&ChangesAll>,
+    ) {
+        for i in 0..self.count {
+            let Some(material) = self.material[i] else { continue };
+            let spot = Spot {
+                scene,
+                part: &model.parts[self.names.part[i] as usize],
+                triangle: self.names.triangle[i] as usize,
+                weights: [weights[0].0[i], weights[1].0[i]],
+                changes: changes.map_or(Changes::NONE, |changes| changes.of(i)),
+            };
+            let (color, opacity) = spot.color(material);
+            self.opacity[i] = opacity;
+            self.color.set(i, color);
         }
     }
 

@@ -48,11 +48,13 @@ pub(crate) struct Bins {
 
 /// The triangles of one run.
 #[derive(Default)]
-struct Run {
-    /// Solid ones that turn their outside to the viewer, and the others, which are mostly hidden.
-    facing: Bin<Record>,
-    averted: Bin<Record>,
-    layers: Bin<Record>,
+pub(crate) struct Run {
+    /// Solid ones that turn their outside to the viewer.
+    pub(crate) facing: Bin<Record>,
+    /// Other solid ones, which are mostly hidden.
+    pub(crate) averted: Bin<Record>,
+    /// Those that may have holes or let light through.
+    pub(crate) layers: Bin<Record>,
 }
 
 /// Returns the number of runs for so many triangles or lines.
@@ -86,6 +88,35 @@ struct List {
     count: u32,
 }
 
+/// The records of a tile in a bin.
+pub(crate) struct Records<'a, T> {
+    bin: &'a Bin<T>,
+    /// Those of the block at hand that are left.
+    block: std::slice::Iter<'a, T>,
+    /// The blocks that are left.
+    list: List,
+}
+
+impl<'a, T> Iterator for Records<'a, T> {
+    type Item = &'a T;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<&'a T> {
+        if let Some(record) = self.block.next() {
+            return Some(record);
+        }
+        let some = BLOCK.min(self.list.count as usize);
+        if some == 0 {
+            return None;
+        }
+        let block = self.list.first as usize;
+        self.list.count -= some as u32;
+        self.list.first = self.bin.next[block];
+        self.block = self.bin.blocks[block][..some].iter();
+        self.block.next()
+    }
+}
+
 impl Bins {
     /// Sets up and sorts all triangles of a pass.
     pub(crate) fn fill(
@@ -106,29 +137,19 @@ impl Bins {
         });
     }
 
-    /// Lists the solid triangles of a tile that turn their outside to the viewer, by rising ids.
-    pub(crate) fn facing(&self, tile: usize) -> impl Iterator<Item = &[Record]> {
-        self.runs[..self.used].iter().flat_map(move |run| run.facing.of_tile(tile))
-    }
-
-    /// Lists its other solid triangles.
-    pub(crate) fn averted(&self, tile: usize) -> impl Iterator<Item = &[Record]> {
-        self.runs[..self.used].iter().flat_map(move |run| run.averted.of_tile(tile))
-    }
-
-    /// Lists the triangles of a tile that may let light through.
-    pub(crate) fn layers(&self, tile: usize) -> impl Iterator<Item = &Record> {
-        self.runs[..self.used].iter().flat_map(move |run| run.layers.of_tile(tile).flatten())
+    /// Lists the runs, by rising ids of their triangles.
+    pub(crate) fn runs(&self) -> &[Run] {
+        &self.runs[..self.used]
     }
 
     /// Tells whether nothing touches a tile.
     pub(crate) fn is_empty(&self, tile: usize) -> bool {
-        self.runs[..self.used].iter().all(|run| run.bins().iter().all(|bin| bin.tiles[tile].count == 0))
+        self.runs().iter().all(|run| run.bins().iter().all(|bin| bin.is_empty(tile)))
     }
 
     /// Counts the triangles that are left after clipping and culling.
     pub(crate) fn triangles(&self) -> u64 {
-        self.runs[..self.used].iter().flat_map(Run::bins).map(|bin| bin.count).sum()
+        self.runs().iter().flat_map(Run::bins).map(|bin| bin.count).sum()
     }
 
     /// Returns the bytes held.
@@ -186,28 +207,42 @@ impl Run {
         if class == Class::Nothing || pass.without.is_some_and(|w| w.leaves_out(part, triangle)) {
             return;
         }
-        let culls = pass.culls_back || (class == Class::Layer && part.one_sided_layers);
-        let sides = part.sides(culls && pass.role == Role::Camera);
         let id = part.first_triangle + triangle as u32;
-        let mut put = |corners: &Corners, plane: &dyn Fn() -> DepthPlane| {
-            let area = corners.area();
-            let record = if sides.draws(area) { Record::new(corners, area, plane, id, setup.reach) } else { None };
-            let Some(record) = record else { return };
-            let bin = match class {
-                Class::Layer => &mut self.layers,
-                _ if (area < 0) != part.mirrored => &mut self.facing,
-                _ => &mut self.averted,
-            };
-            bin.add(setup.grid, record);
-        };
         let indices = mesh.triangles[triangle];
-        if indices.iter().all(|&i| vertices.snapped(i).2 & border::CLIPPING == 0) {
-            let corners = vertices.corners(indices);
-            put(&corners, &|| DepthPlane::through(&corners.points));
-        } else {
+        let is_clipped = |vertex: u32| vertices.snapped(vertex).2 & border::CLIPPING != 0;
+        if indices.into_iter().any(is_clipped) {
             let corners = mesh.corners(triangle).map(|p| setup.screen_from_object.apply(p.as_dvec3()));
-            clip(pass.lens, corners, |points, plane| put(&Corners::snapped(points), &|| plane));
+            clip(pass.lens, corners, |points, plane| {
+                self.put(setup, (class, id), &Corners::snapped(points), Some(plane));
+            });
+        } else {
+            self.put(setup, (class, id), &vertices.corners(indices), None);
         }
+    }
+
+    /// Puts a triangle, or a piece of one with the plane of its depth, into the tiles that it touches.
+    #[inline]
+    fn put(
+        &mut self,
+        setup: &Setup<'_>,
+        (class, id): (Class, u32),
+        corners: &Corners,
+        plane: Option<DepthPlane>,
+    ) {
+        let Setup { pass, part, .. } = setup;
+        let culls = pass.culls_back || (class == Class::Layer && part.one_sided_layers);
+        let area = corners.area();
+        if !part.sides(culls && pass.role == Role::Camera).draws(area) {
+            return;
+        }
+        let plane = || plane.unwrap_or_else(|| DepthPlane::through(&corners.points));
+        let Some(record) = Record::new(corners, area, plane, id, setup.reach) else { return };
+        let bin = match class {
+            Class::Layer => &mut self.layers,
+            _ if (area < 0) != part.mirrored => &mut self.facing,
+            _ => &mut self.averted,
+        };
+        bin.add(setup.grid, record);
     }
 }
 
@@ -277,18 +312,14 @@ impl<T: Placed + Copy> Bin<T> {
         self.count += u64::from(touches);
     }
 
-    /// Lists the records of a tile, some at a time.
-    pub(crate) fn of_tile(&self, tile: usize) -> impl Iterator<Item = &[T]> {
-        let List { mut first, mut count, .. } = self.tiles[tile];
-        std::iter::from_fn(move || {
-            let some = BLOCK.min(count as usize);
-            if some == 0 {
-                return None;
-            }
-            let block = first as usize;
-            (first, count) = (self.next[block], count - some as u32);
-            Some(&self.blocks[block][..some])
-        })
+    pub(crate) fn is_empty(&self, tile: usize) -> bool {
+        self.tiles[tile].count == 0
+    }
+
+    /// Lists the records of a tile.
+    #[inline(always)]
+    pub(crate) fn of_tile(&self, tile: usize) -> Records<'_, T> {
+        Records { bin: self, block: [].iter(), list: self.tiles[tile] }
     }
 
     pub(crate) fn bytes(&self) -> u64 {

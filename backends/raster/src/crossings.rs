@@ -7,7 +7,6 @@ use crate::face::Face;
 use crate::lens::Lens;
 use crate::model::Model;
 use crate::tile::NO_TRIANGLE;
-use polyptych_core::scene::Scene;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The triangles that a picture shows, row by row.
@@ -23,14 +22,7 @@ impl Seen<'_> {
     }
 
     /// Returns which share of a pixel intersection lines take, and the part whose color they have.
-    pub(crate) fn crossing(
-        &self,
-        scene: &Scene,
-        model: &Model,
-        lens: &Lens,
-        x: u32,
-        y: u32,
-    ) -> Option<(f32, usize)> {
+    pub(crate) fn crossing(&self, model: &Model, lens: &Lens, x: u32, y: u32) -> Option<(f32, usize)> {
         let own = self.at(x, y);
         if own == NO_TRIANGLE {
             return None;
@@ -50,7 +42,7 @@ impl Seen<'_> {
             if other_part == part {
                 continue;
             }
-            let [own, other] = [own, other].map(|id| Face::new(scene, model, lens, id));
+            let [own, other] = [own, other].map(|id| Face::new(model, lens, id));
             // How much nearer is the triangle of this pixel, here and there?
             let gap = |x: u32, y: u32| {
                 let [x, y] = [x, y].map(|v| f64::from(v) + 0.5);

@@ -33,7 +33,7 @@ impl Painter<'_> {
         target.for_each_band(control.threads, TILE_HEIGHT, &|band| {
             for i in 0..band.width * band.rows {
                 let (x, y) = (i % band.width, band.first_row + i / band.width);
-                if let Some((share, part)) = seen.crossing(scene, model, self.lens, x, y) {
+                if let Some((share, part)) = seen.crossing(model, self.lens, x, y) {
                     let (_, direction) = self.lens.line(f64::from(x) + 0.5, f64::from(y) + 0.5);
                     let paper = scene.environment.background.color(direction.normalize_or_zero());
                     let color = &mut band.color[i as usize];
@@ -70,8 +70,8 @@ impl Painter<'_> {
                 places.iter().zip(row).for_each(|(place, id)| place.store(*id, Ordering::Relaxed));
             }
         }
-        let Illumination { scene, model, .. } = self.light;
-        let of = (scene, model, self.lens, drawing.lines);
+        let model = self.light.model;
+        let of = (model, self.lens, drawing.lines);
         let Scratch { faces, ink, .. } = scratch;
         if !drawing.strokes.draw(tile, area, seen, of, faces, ink) {
             return;

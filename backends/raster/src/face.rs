@@ -5,12 +5,13 @@
 //! Along the rays of a picture every linear function of a point is affine in column and row; a triangle is set
 //! up once for all pixels of a tile that show it.
 
+use crate::color::{Changes, ChangesAll, Spot, changes, changes_all};
 use crate::lens::{Lens, OnRays};
 use crate::model::{Model, Part};
 use crate::tile::NO_TRIANGLE;
-use glam::{DVec2, DVec3, Vec2, Vec3};
-use polyptych_core::lanes::{F32x8, F64x8, Vec3x8};
-use polyptych_core::scene::{Mapping, Material, Mesh, Scene, Texture};
+use glam::{DVec3, Vec3};
+use polyptych_core::lanes::{F64x8, Vec3x8};
+use polyptych_core::scene::{Material, Mesh, Scene};
 
 /// Weights of corners that a snapped corner may cause outside of the triangle are extrapolated up to here;
 /// beyond (narrow slivers) the nearest point of the triangle is taken.
@@ -34,8 +35,6 @@ pub(crate) struct Face {
     pub(crate) part: u32,
     pub(crate) triangle: u32,
     is_mirrored: bool,
-    /// Whether color or opacity change over the triangle.
-    pub(crate) is_painted: bool,
 }
 
 /// Where a ray meets a triangle.
@@ -53,19 +52,9 @@ pub(crate) struct Met {
 /// Where eight rays meet a triangle, all of them inside and from one side.
 pub(crate) struct MetAll {
     pub(crate) t: F64x8,
-    v: F64x8,
-    w: F64x8,
     /// Of the second and third corner.
-    pub(crate) weights: [F32x8; 2],
+    pub(crate) weights: [F64x8; 2],
     pub(crate) from_within: bool,
-}
-
-impl MetAll {
-    /// Returns where one of the rays meets it.
-    pub(crate) fn of(&self, lane: usize) -> Met {
-        let (v, w) = (self.v.0[lane], self.w.0[lane]);
-        Met { t: self.t.0[lane], weights: [1.0 - v - w, v, w], from_within: self.from_within, held: None }
-    }
 }
 
 /// A place of the picture of a scene.
@@ -79,7 +68,7 @@ pub(crate) struct Place<'a> {
 }
 
 impl Face {
-    pub(crate) fn new(scene: &Scene, model: &Model, lens: &Lens, id: u32) -> Self {
+    pub(crate) fn new(model: &Model, lens: &Lens, id: u32) -> Self {
         let (index, triangle) = model.find(id);
         let part = &model.parts[index];
         let [a, b, c] = part.corners(triangle, lens.origin);
@@ -89,8 +78,6 @@ impl Face {
         let slopes = [edges[1].cross(normal) * share, normal.cross(edges[0]) * share];
         let mesh = part.mesh();
         let corners = mesh.triangles[triangle];
-        let material = scene.material(&scene.objects[part.object], mesh.slot(triangle));
-        let is_painted = material.texture.is_some() || !mesh.colors.is_empty();
         let turned = if part.mirrored { -normal } else { normal };
         let outward = turned.normalize_or_zero();
         Self {
@@ -105,7 +92,6 @@ impl Face {
             part: index as u32,
             triangle: triangle as u32,
             is_mirrored: part.mirrored,
-            is_painted,
         }
     }
 
@@ -132,25 +118,24 @@ impl Face {
         let zero = F64x8::splat(0.0);
         let (start, slope) = self.across.at_all(lens.rays, x, y);
         let t = (F64x8::splat(self.height) - start) / slope;
-        let weight = |i: usize| {
-            let (start, slope) = self.weights[i].at_all(lens.rays, x, y);
-            (start - F64x8::splat(self.offsets[i])) + slope * t
-        };
-        let (v, w) = (weight(0), weight(1));
+        let (start_v, slope_v) = self.weights[0].at_all(lens.rays, x, y);
+        let (start_w, slope_w) = self.weights[1].at_all(lens.rays, x, y);
+        let v = (start_v - F64x8::splat(self.offsets[0])) + slope_v * t;
+        let w = (start_w - F64x8::splat(self.offsets[1])) + slope_w * t;
         let inside = (F64x8::splat(1.0) - v - w).at_least(zero) & v.at_least(zero) & w.at_least(zero);
         let (up, down) = (slope.above(zero), zero.above(slope));
         if (!inside).any() || ((!up).any() && (!down).any()) {
             return None;
         }
         let from_within = up.has(0) != self.is_mirrored;
-        Some(MetAll { t, v, w, weights: [v.round(), w.round()], from_within })
+        Some(MetAll { t, weights: [v, w], from_within })
     }
 
     /// Returns the interpolated shading normals, not of unit length, on the outside.
     #[inline(always)]
     pub(crate) fn normals_of(&self, met: &MetAll) -> Vec3x8 {
         let [a, b, c] = self.normals.map(Vec3x8::splat);
-        a + b.scaled(met.weights[0]) + c.scaled(met.weights[1])
+        a + b.scaled(met.weights[0].round()) + c.scaled(met.weights[1].round())
     }
 
     /// Returns a corner relative to the lens's origin, and its shading normal, not of unit length.
@@ -194,67 +179,30 @@ impl Face {
     }
 
     /// Returns base color and effective opacity where a ray met it.
-    #[inline(always)]
     pub(crate) fn color(&self, at: &Place<'_>, met: &Met) -> (Vec3, f32) {
-        let material = self.material(at.scene, at.model);
-        if self.is_painted {
-            self.painted(at, material, met)
-        } else {
-            (material.base_color, material.effective_opacity(material.opacity).min(1.0))
-        }
+        let spot = Spot {
+            scene: at.scene,
+            part: &at.model.parts[self.part as usize],
+            triangle: self.triangle as usize,
+            weights: [met.weights[1], met.weights[2]],
+            changes: self.changes_at(at.lens, at.x, at.y, met.t),
+        };
+        spot.color(self.material(at.scene, at.model))
     }
 
-    #[inline(never)]
-    fn painted(&self, at: &Place<'_>, material: &Material, met: &Met) -> (Vec3, f32) {
-        let part = &at.model.parts[self.part as usize];
-        let mesh = part.mesh();
-        let [a, b, c] = mesh.triangles[self.triangle as usize].map(|i| i as usize);
-        let weights = met.weights;
-        let texture = material.texture.and_then(|t| at.scene.textures.get(t));
-        let (base, opacity) = match texture {
-            None => (material.base_color, material.opacity),
-            Some(texture) => {
-                let uv = (!mesh.uvs.is_empty()).then(|| {
-                    let [u, v, w] = [a, b, c].map(|i| mesh.uvs[i].as_dvec2());
-                    (u * weights[0] + v * weights[1] + w * weights[2]).as_vec2()
-                });
-                let [p, q, r] = [a, b, c].map(|i| mesh.positions[i].as_dvec3());
-                let position = (p * weights[0] + q * weights[1] + r * weights[2]).as_vec3();
-                let normal = (q - p).cross(r - p).normalize_or_zero().as_vec3();
-                let lod = self.lod(at, part, material, texture, met);
-                at.scene.base_color(material, uv.map(|v| v.to_array()), position, normal, lod)
-            }
-        };
-        let tinted = part.tinted(base, self.triangle as usize, [weights[1] as f32, weights[2] as f32]);
-        (tinted, material.effective_opacity(opacity).min(1.0))
+    /// Returns how the weights change over a pixel where a ray met it.
+    pub(crate) fn changes_at(&self, lens: &Lens, x: f64, y: f64, t: f64) -> Changes {
+        changes(lens, &self.across, &self.weights, (x, y), t)
     }
 
-    /// Returns the mip level at which a texel is as large as the pixel, from the exact change of the point over
-    /// one pixel to the right and one down.
-    fn lod(&self, at: &Place<'_>, part: &Part, material: &Material, texture: &Texture, met: &Met) -> f32 {
-        let mesh = part.mesh();
-        let (right, down) = at.lens.change(met.t);
-        let direction = at.lens.line(at.x, at.y).1;
-        let normal = self.edges[0].cross(self.edges[1]);
-        let share = 1.0 / normal.dot(direction);
-        let moved = [right, down].map(|d| d - direction * (normal.dot(d) * share));
-        let scale = match material.mapping {
-            Mapping::Uv if !mesh.uvs.is_empty() => {
-                let corners = mesh.triangles[self.triangle as usize];
-                let [a, b, c] = corners.map(|i| mesh.uvs[i as usize].as_dvec2());
-                let across = 1.0 / normal.length_squared();
-                let slopes = [self.edges[1].cross(normal) * across, normal.cross(self.edges[0]) * across];
-                let [x, y] =
-                    moved.map(|d| -> DVec2 { (b - a) * d.dot(slopes[0]) + (c - a) * d.dot(slopes[1]) });
-                return texture.lod(x.as_vec2(), y.as_vec2());
-            }
-            Mapping::Uv => 1.0,
-            Mapping::Triplanar { scale } => scale,
-        };
-        // In object space lengths are those before the part's transform.
-        let back = part.object_from_vector;
-        let [x, y] = moved.map(|d| Vec2::new((back * d).length() as f32 * scale, 0.0));
-        texture.lod(x, y)
+    /// Returns how the weights change over a pixel where eight rays met it.
+    #[inline(always)]
+    pub(crate) fn changes(&self, lens: &Lens, x: F64x8, y: F64x8, met: &MetAll) -> ChangesAll {
+        let [v, w] = &self.weights;
+        let (plane, v_slope, w_slope) =
+            (self.across.at_all(lens.rays, x, y).1, v.at_all(lens.rays, x, y).1, w.at_all(lens.rays, x, y).1);
+        let steps = (self.across.steps(), [v.steps(), w.steps()]);
+        changes_all(lens, met.t, (plane, [v_slope, w_slope]), steps)
     }
 }
 
@@ -315,14 +263,14 @@ impl Faces {
 
     /// Returns the index of a triangle, set up where it was not yet.
     #[inline]
-    pub(crate) fn find(&mut self, scene: &Scene, model: &Model, lens: &Lens, id: u32) -> u16 {
+    pub(crate) fn find(&mut self, model: &Model, lens: &Lens, id: u32) -> u16 {
         // Neighbors have ids close together: spread them by Knuth's multiplicative hash.
         let mut slot = (id.wrapping_mul(2_654_435_769) >> 20) as usize;
         while self.ids[slot] != id {
             if self.ids[slot] == NO_TRIANGLE {
                 self.ids[slot] = id;
                 self.indices[slot] = self.faces.len() as u16;
-                self.faces.push(Face::new(scene, model, lens, id));
+                self.faces.push(Face::new(model, lens, id));
                 break;
             }
             slot = (slot + 1) % SLOTS;

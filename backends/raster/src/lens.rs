@@ -76,8 +76,8 @@ pub(crate) struct ScreenFromObject {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OnRays {
     base: f64,
-    by_column: f64,
-    by_row: f64,
+    pub(crate) by_column: f64,
+    pub(crate) by_row: f64,
     shared: f64,
 }
 
@@ -246,10 +246,14 @@ impl Lens {
         }
     }
 
-    /// Returns how the point at `t` along a ray moves over one pixel to the right and one down, before it is put
-    /// back onto a surface.
-    pub(crate) fn change(&self, t: f64) -> (DVec3, DVec3) {
-        (self.start.by_column + self.direction.by_column * t, self.start.by_row + self.direction.by_row * t)
+    /// Returns by what rays differ over one pixel to the right and one down: central ones by their direction,
+    /// parallel ones by their start.
+    pub(crate) fn steps(&self) -> [DVec3; 2] {
+        let differs = match self.rays {
+            Rays::Central => &self.direction,
+            Rays::Parallel => &self.start,
+        };
+        [differs.by_column, differs.by_row]
     }
 
     /// Returns the divisor of a point's column and row.
@@ -320,6 +324,12 @@ impl OnRays {
 }
 
 impl OnRays {
+    /// Returns by what it differs over one pixel to the right and one down, eight times.
+    #[inline(always)]
+    pub(crate) fn steps(&self) -> [F64x8; 2] {
+        [F64x8::splat(self.by_column), F64x8::splat(self.by_row)]
+    }
+
     /// The same for eight rays.
     #[inline(always)]
     pub(crate) fn at_all(&self, rays: Rays, x: F64x8, y: F64x8) -> (F64x8, F64x8) {

@@ -15,6 +15,7 @@
 //!  layers     fragments of see-through triangles, sorted per pixel
 //!  face       a visible triangle set up once a tile: where rays meet it, normals, texture with its mip level
 //!  octet      the same in lanes for pixels that show a triangle each
+//!  color      textures and colors of corners
 //!  batch      eight visible pixels at once: distances, places, unit normals
 //!  light      the lighting equation of the core over a batch, with shadows
 //!  lookup     what stands between eight points and a light
@@ -41,6 +42,7 @@ mod batch;
 mod bin;
 mod casters;
 mod clip;
+mod color;
 mod conversion;
 mod crossings;
 mod decide;

@@ -204,7 +204,7 @@ impl Shadows {
         }
         let lens = Lens::parallel(self.origin + sight.place, looking(sight.to_light), [1.0; 2], [0; 2]);
         let place = Place { scene, model, lens: &lens, x: 0.0, y: 0.0 };
-        place.is_solid(&Face::new(scene, model, &lens, id))
+        place.is_solid(&Face::new(model, &lens, id))
     }
 }
 

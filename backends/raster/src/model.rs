@@ -32,8 +32,6 @@ pub(crate) struct Part {
     pub(crate) object: usize,
     pub(crate) source: Source,
     pub(crate) world_from_object: DAffine3,
-    /// Turns vectors of world space into such of object space.
-    pub(crate) object_from_vector: DMat3,
     /// Turns normals of object space into such of world space, up to a factor that keeps `f32` in range.
     pub(crate) world_from_normal: Mat3,
     /// Whether the transform turns the winding over.
@@ -46,8 +44,6 @@ pub(crate) struct Part {
     reach: f64,
     /// How each slot looks to the camera and to lights.
     classes: Vec<[Class; 2]>,
-    /// Whether any slot has a texture.
-    pub(crate) is_textured: bool,
     /// Whether light can be blocked on its way to it.
     pub(crate) takes_shadow: bool,
     /// Whether faces that let light through are seen from outside only: one step into a solid is one surface.
@@ -150,7 +146,6 @@ impl Model {
         self.parts.push(Part {
             object: index,
             world_from_object: object.world_from_object,
-            object_from_vector: matrix.inverse(),
             world_from_normal: normal_matrix(&matrix),
             mirrored: matrix.determinant() < 0.0,
             first_triangle: self.triangles,
@@ -158,8 +153,6 @@ impl Model {
             bounds,
             reach,
             classes: classes(scene, object),
-            is_textured: (0..object.materials.len().max(1))
-                .any(|slot| scene.material(object, slot).texture.is_some()),
             takes_shadow: !matches!(*object.shape, Shape::Volume(_)),
             one_sided_layers: matches!(*object.shape, Shape::Voxels(_)),
             source,
@@ -211,6 +204,12 @@ impl Part {
         let [a, b, c] = mesh.triangles[triangle];
         let tint = |corner: u32| mesh.colors[corner as usize];
         color * (tint(a) * (1.0 - v - w) + tint(b) * v + tint(c) * w)
+    }
+
+    /// Tells whether a material has the same color everywhere on it.
+    #[inline(always)]
+    pub(crate) fn has_one_color(&self, material: &Material) -> bool {
+        material.texture.is_none() && self.mesh().colors.is_empty()
     }
 
     /// Tells whether all triangles have one material.

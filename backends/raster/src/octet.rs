@@ -3,6 +3,7 @@
 //! What a [`Face`](crate::face::Face) finds once for all pixels of a triangle is found here in lanes for pixels of
 //! triangles that hardly show more than one.
 
+use crate::color::{ChangesAll, changes_all};
 use crate::lens::Lens;
 use crate::model::Model;
 use glam::{DVec3, Vec3};
@@ -37,12 +38,12 @@ pub(crate) struct OctetMet {
     pub(crate) weights: [F64x8; 2],
     /// Which rays pass through their triangle; what is said of others means nothing.
     pub(crate) inside: Mask8,
-    /// Which come from the side that is not outside.
-    pub(crate) from_within: Mask8,
     /// Unit true normals on the side where the rays come from.
     pub(crate) true_normal: DVec3x8,
     /// Shading normals on the same side, not of unit length; zero where there are none.
     pub(crate) normal: Vec3x8,
+    /// How the weights change over a pixel, where that is asked for.
+    pub(crate) changes: Option<ChangesAll>,
 }
 
 impl Octet {
@@ -102,7 +103,7 @@ impl Octet {
 
     /// Meets the rays through eight places of the picture.
     #[inline(always)]
-    pub(crate) fn meet(&self, lens: &Lens, x: F64x8, y: F64x8) -> OctetMet {
+    pub(crate) fn meet(&self, lens: &Lens, x: F64x8, y: F64x8, with_changes: bool) -> OctetMet {
         let (zero, one) = (F64x8::ZERO, F64x8::splat(1.0));
         let (start, direction) = lens.lines(x, y);
         let [ab, ac] = self.edges;
@@ -111,8 +112,8 @@ impl Octet {
         let (slope, from_start) = (direction.dot(normal), self.first - start);
         let t = from_start.dot(normal) / slope;
         let place = direction.scaled(t) - from_start;
-        let v = place.dot(ac.cross(normal)) * share;
-        let w = place.dot(normal.cross(ab)) * share;
+        let to_weights = [ac.cross(normal).scaled(share), normal.cross(ab).scaled(share)];
+        let [v, w] = [place.dot(to_weights[0]), place.dot(to_weights[1])];
         let inside = (one - v - w).at_least(zero) & v.at_least(zero) & w.at_least(zero);
         let along = slope.above(zero);
         let from_within = (along & !self.mirrored) | (!along & self.mirrored);
@@ -121,7 +122,14 @@ impl Octet {
         let [a, b, c] = self.normals;
         let outside = a + (b - a).scaled(v.round()) + (c - a).scaled(w.round());
         let flipped = F32x8::ZERO - F32x8::splat(1.0);
-        let normal = outside.scaled(from_within.pick(flipped, F32x8::splat(1.0)));
-        OctetMet { t, weights: [v, w], inside, from_within, true_normal, normal }
+        let shading = outside.scaled(from_within.pick(flipped, F32x8::splat(1.0)));
+        let changes = with_changes.then(|| {
+            let [right, down] = lens.steps().map(DVec3x8::splat);
+            let steps = |of: DVec3x8| [of.dot(right), of.dot(down)];
+            let [v, w] = to_weights;
+            let slopes = (slope, [direction.dot(v), direction.dot(w)]);
+            changes_all(lens, t, slopes, (steps(normal), [steps(v), steps(w)]))
+        });
+        OctetMet { t, weights: [v, w], inside, true_normal, normal: shading, changes }
     }
 }

@@ -161,17 +161,21 @@ impl<'a> Painter<'a> {
     ) -> u64 {
         let area = grid.area(tile);
         if self.drawing.is_none() && self.bins.is_empty(tile) {
-            (0..area.height as u32).for_each(|row| self.background_row(&area, row, band));
+            // No closure: it would be compiled for the plain processor.
+            for row in 0..area.height as u32 {
+                self.background_row(&area, row, band);
+            }
             return 0;
         }
         // 1. Visibility: the nearest solid triangle of each pixel.
         let hides = self.drawing.is_none_or(|drawing| drawing.hides);
-        let buffer =
-            if hides { TileBuffer::of(self.bins, tile, &area, [0; 2]) } else { TileBuffer::new() };
+        let buffer = if hides { TileBuffer::of(self.bins, tile, &area, [0; 2]) } else { TileBuffer::new() };
         // 2. What light may pass through, in front of it. It hides no line.
         scratch.fragments.clear();
-        for record in self.bins.layers(tile).take_while(|_| self.drawing.is_none()) {
-            collect(&mut scratch.fragments, record, &area, &buffer);
+        for run in self.bins.runs().iter().take_while(|_| self.drawing.is_none()) {
+            for record in run.layers.of_tile(tile) {
+                collect(&mut scratch.fragments, record, &area, &buffer);
+            }
         }
         sort(&mut scratch.fragments);
         for row in 0..area.height as u32 {
@@ -287,17 +291,15 @@ impl<'a> Painter<'a> {
     /// Returns the index of a triangle in the table of a tile.
     #[inline(always)]
     fn find(&self, faces: &mut Faces, id: u32) -> u16 {
-        faces.find(self.light.scene, self.light.model, self.lens, id)
+        faces.find(self.light.model, self.lens, id)
     }
 
-    /// Adds a sample to a batch that is not full. A triangle whose texture or corners' light is to be found gets a face.
+    /// Adds a sample to a batch that is not full. A triangle whose corners' light is to be found gets a face.
     #[inline(always)]
     pub(crate) fn add(&self, batch: &mut Batch<'a>, faces: &mut Faces, place: (f64, f64), id: u32, tag: u32) {
         let model = self.light.model;
         let part = model.part_near(batch.last_part(), id);
-        let is_painted = model.parts[part].is_textured && (self.ask == Ask::Color || tag & LAYER != 0);
-        let needs_face = is_painted || self.shading == Shading::Gouraud;
-        let face = if needs_face { self.find(faces, id) } else { NO_FACE };
+        let face = if self.shading == Shading::Gouraud { self.find(faces, id) } else { NO_FACE };
         batch.push(place, [id, part as u32, id - model.parts[part].first_triangle], face, tag);
     }
 

@@ -263,8 +263,8 @@ fn draw(
         }
         let area = grid.area(index);
         let mut buffer = TileBuffer::of(bins, index, &area, [0; 2]);
-        for record in bins.layers(index) {
-            let face = Face::new(scene, pass.model, pass.lens, record.id);
+        for record in bins.runs().iter().flat_map(|run| run.layers.of_tile(index)) {
+            let face = Face::new(pass.model, pass.lens, record.id);
             buffer.draw_where(record, &area, |x, y| {
                 Place { scene, model: pass.model, lens: pass.lens, x, y }.is_solid(&face)
             });

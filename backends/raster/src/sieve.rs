@@ -76,9 +76,8 @@ impl Eight {
         let is_small = (reach == 0) & (x1.wrapping_sub(x0) <= 1) & (y1.wrapping_sub(y0) <= 1);
         let (left, right) = ((x0 << 8).wrapping_add(STEPS / 2), (x1 << 8).wrapping_add(STEPS / 2));
         let (top, bottom) = ((y0 << 8).wrapping_add(STEPS / 2), (y1 << 8).wrapping_add(STEPS / 2));
-        let turn = |[ux, uy]: [i32; 2], [vx, vy]: [i32; 2]| {
-            ux.wrapping_mul(vy).wrapping_sub(vx.wrapping_mul(uy))
-        };
+        let turn =
+            |[ux, uy]: [i32; 2], [vx, vy]: [i32; 2]| ux.wrapping_mul(vy).wrapping_sub(vx.wrapping_mul(uy));
         let between = |[ux, uy]: [i32; 2], [vx, vy]: [i32; 2]| [vx.wrapping_sub(ux), vy.wrapping_sub(uy)];
         let (a, b, c) = ([ax, ay], [bx, by], [cx, cy]);
         let area = turn(between(a, b), between(a, c));

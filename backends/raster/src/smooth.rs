@@ -63,7 +63,7 @@ impl Smooth {
             let buffer = TileBuffer::of(bins, tile, area, *place);
             let of_place = &mut self.layers[i];
             of_place.clear();
-            for record in bins.layers(tile) {
+            for record in bins.runs().iter().flat_map(|run| run.layers.of_tile(tile)) {
                 collect(of_place, &record.seen_from(*place), area, &buffer);
             }
             sort(of_place);

@@ -14,7 +14,6 @@ use crate::tile::{NO_TRIANGLE, Placed, TILE_PIXELS, TILE_WIDTH, TileArea, TileGr
 use crate::transform::{PartOnScreen, ScreenVertices, border};
 use glam::DVec2;
 use polyptych_core::parallel::{Threads, for_each_mut};
-use polyptych_core::scene::Scene;
 use std::sync::atomic::AtomicU32;
 
 /// How far from a line pixels show something of it.
@@ -117,7 +116,7 @@ impl Strokes {
     }
 
     fn of_tile(&self, tile: usize) -> impl Iterator<Item = &Stroke> {
-        self.runs[..self.used].iter().flat_map(move |run| run.of_tile(tile).flatten())
+        self.runs[..self.used].iter().flat_map(move |run| run.of_tile(tile))
     }
 
     pub(crate) fn bytes(&self) -> u64 {
@@ -131,7 +130,7 @@ impl Strokes {
         tile: usize,
         area: &TileArea,
         seen: &[u32; TILE_PIXELS],
-        (scene, model, lens, lines): (&Scene, &Model, &Lens, &Lines),
+        (model, lens, lines): (&Model, &Lens, &Lines),
         faces: &mut Faces,
         ink: &mut Option<Box<Ink>>,
     ) -> bool {
@@ -148,7 +147,7 @@ impl Strokes {
                     return;
                 }
                 let mut hides = |id: u32| {
-                    let face = faces.find(scene, model, lens, id);
+                    let face = faces.find(model, lens, id);
                     let face = &faces.faces[usize::from(face)];
                     face.ahead(lens, at.x, at.y) < ahead * (1.0 - BEHIND)
                         && !stroke.ends_near(at, edge).any(|end| touches(model, id, stroke.part, end))

@@ -355,10 +355,7 @@ impl TileBuffer {
         let mut buffer = Self::new();
         #[cfg(target_arch = "x86_64")]
         if crate::wide::has_avx2() {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
+            #[expect(unsafe_code, reason = "a kernel compiled for a processor feature can only be called so")]
             // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
             unsafe {
                 buffer.fill_avx2(bins, tile, area, place);
@@ -383,20 +380,23 @@ impl TileBuffer {
         // a dozen cycles each. It cannot where it does not know that both places are the same.
         let apart = std::hint::black_box(0);
         let mut last = 0;
-        for record in bins.facing(tile).flatten() {
-            debug_assert!(record.id >= last, "of equal depths the first drawn wins: ids must rise");
-            last = record.id;
-            self.draw::<false>(&record.seen_from(place), area, apart);
+        for run in bins.runs() {
+            for record in run.facing.of_tile(tile) {
+                debug_assert!(record.id >= last, "of equal depths the first drawn wins: ids must rise");
+                last = record.id;
+                self.draw::<false>(&record.seen_from(place), area, apart);
+            }
         }
-        let mut averted = bins.averted(tile).peekable();
-        if averted.peek().is_none() {
+        if bins.runs().iter().all(|run| run.averted.is_empty(tile)) {
             return;
         }
         let coarse = Coarse::of(self);
-        for record in averted.flatten() {
-            let record = record.seen_from(place);
-            if !coarse.hides(&record, area) {
-                self.draw::<true>(&record, area, apart);
+        for run in bins.runs() {
+            for record in run.averted.of_tile(tile) {
+                let record = record.seen_from(place);
+                if !coarse.hides(&record, area) {
+                    self.draw::<true>(&record, area, apart);
+                }
             }
         }
     }
@@ -413,7 +413,13 @@ impl TileBuffer {
 
     /// Draws a triangle row by row. What columns add to depths is found once for all rows.
     #[inline(always)]
-    fn draw_spans<const TIES: bool>(&mut self, record: &Record, area: &TileArea, pixels: &Pixels, apart: usize) {
+    fn draw_spans<const TIES: bool>(
+        &mut self,
+        record: &Record,
+        area: &TileArea,
+        pixels: &Pixels,
+        apart: usize,
+    ) {
         let mut columns = [F64x8::ZERO; BLOCKS];
         let block = |x: i32| (x - area.x) as usize / BLOCK;
         let first = block(pixels.x0);
@@ -472,7 +478,14 @@ impl TileBuffer {
     /// Draws eight pixels of a triangle where they are not outside of it, and nearer than what is there. `apart` is
     /// zero; see [`TileBuffer::of_here`].
     #[inline(always)]
-    fn draw_block<const TIES: bool>(&mut self, at: usize, apart: usize, depth: F32x8, outside: Mask8, id: u32) {
+    fn draw_block<const TIES: bool>(
+        &mut self,
+        at: usize,
+        apart: usize,
+        depth: F32x8,
+        outside: Mask8,
+        id: u32,
+    ) {
         let (old, old_ids) = (F32x8::load(&self.depth[at..]), Mask8::load(&self.id[at..]));
         let mut wins = depth.above(old);
         if TIES {

@@ -115,12 +115,21 @@ impl Texture {
     /// Coordinates that are not finite read as 0. Returns linear RGBA in `[0, 1]`.
     #[must_use]
     pub fn sample(&self, uv: [f32; 2], lod: f32) -> Vec4 {
+        self.sample_here(uv, lod)
+    }
+
+    /// The same in the caller's instructions, for kernels that are compiled for wide registers.
+    #[must_use]
+    #[inline(always)]
+    pub fn sample_here(&self, uv: [f32; 2], lod: f32) -> Vec4 {
         #[cfg(debug_assertions)]
         LOOKUPS.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let uv = uv.map(|c| if c.is_finite() { c } else { 0.0 });
+        let [u, v] = uv;
+        let uv = [if u.is_finite() { u } else { 0.0 }, if v.is_finite() { v } else { 0.0 }];
         let last = (self.levels.len() - 1) as f32;
         let lod = if lod > 0.0 { lod.min(last) } else { 0.0 };
-        let (below, part) = (lod.floor() as usize, lod.fract());
+        let below = lod as usize;
+        let part = lod - below as f32;
         let near = self.levels[below].bilinear(uv, self.wrap);
         if part == 0.0 { near } else { near.lerp(self.levels[below + 1].bilinear(uv, self.wrap), part) }
     }
@@ -184,11 +193,18 @@ impl Level {
         [color.x, color.y, color.z, alpha / count].map(|v| v.round() as u16)
     }
 
+    #[inline(always)]
     fn bilinear(&self, uv: [f32; 2], wrap: [TextureWrap; 2]) -> Vec4 {
         let (x0, x1, fx) = neighbors(uv[0], self.width, wrap[0]);
         let (y0, y1, fy) = neighbors(uv[1], self.height, wrap[1]);
-        let at = |x: u32, y: u32| Vec4::from_array(self.texels[(y * self.width + x) as usize].map(f32::from));
-        at(x0, y0).lerp(at(x1, y0), fx).lerp(at(x0, y1).lerp(at(x1, y1), fx), fy) / FULL
+        let (upper, lower) = (y0 * self.width, y1 * self.width);
+        let at = |i: u32| {
+            let [r, g, b, a] = self.texels[i as usize];
+            Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
+        };
+        let (above, below) =
+            (at(upper + x0).lerp(at(upper + x1), fx), at(lower + x0).lerp(at(lower + x1), fx));
+        above.lerp(below, fy) / FULL
     }
 }
 
@@ -199,6 +215,7 @@ fn span(i: u32, half: u32, full: u32) -> std::ops::Range<u32> {
 }
 
 /// Returns the two texels around a coordinate and the share of the second.
+#[inline(always)]
 fn neighbors(coordinate: f32, size: u32, wrap: TextureWrap) -> (u32, u32, f32) {
     let folded = match wrap {
         TextureWrap::Repeat => coordinate - coordinate.floor(),
@@ -208,14 +225,19 @@ fn neighbors(coordinate: f32, size: u32, wrap: TextureWrap) -> (u32, u32, f32) {
         }
         TextureWrap::Clamp => coordinate.clamp(0.0, 1.0),
     };
+    // From half a texel before the first one to half a texel before the end.
     let texel = folded * size as f32 - 0.5;
-    let (floor, part) = (texel.floor(), texel - texel.floor());
-    let last = size as i64 - 1;
-    let place = |i: i64| match wrap {
-        TextureWrap::Repeat => i.rem_euclid(i64::from(size)) as u32,
-        TextureWrap::Mirror | TextureWrap::Clamp => i.clamp(0, last) as u32,
+    let floor = texel.floor();
+    let (first, last) = (floor as i32, size as i32 - 1);
+    let (before, behind) = match wrap {
+        TextureWrap::Repeat => (last, 0),
+        TextureWrap::Mirror | TextureWrap::Clamp => (0, last),
     };
-    (place(floor as i64), place(floor as i64 + 1), part)
+    let place = |i: i32| {
+        let i = if i < 0 { before } else { i };
+        (if i > last { behind } else { i }) as u32
+    };
+    (place(first), place(first + 1), texel - floor)
 }
 
 #[cfg(test)]

@@ -119,7 +119,7 @@ fn weights_agree_with_rays_to_a_thousandth_of_a_texel() {
     assert!(model.add(&scene, 0, Source::Given(scene.objects[0].shape.clone()), None));
     let camera = camera([0.0, 0.05, 4.0], [0.0, 0.0, -30.0]);
     let lens = Lens::of_camera(&camera, 640, 480, 1e-6).unwrap();
-    let face = Face::new(&scene, &model, &lens, 0);
+    let face = Face::new(&model, &lens, 0);
     for (x, y) in [(320.5, 260.5), (10.5, 479.5), (600.5, 241.5), (320.5, 240.5)] {
         let direction = lens.line(x, y).1;
         let met = face.meet(&lens, x, y);
