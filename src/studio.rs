@@ -116,7 +116,8 @@ impl Studio {
         result.map(|prepared| (prepared, time)).map_err(|error| render_error(backend, error))
     }
 
-    /// Draws what was prepared into a picture. Returns what was done and the milliseconds it took.
+    /// Draws what was prepared into a picture. Returns what was done and the milliseconds it took. The picture is drawn
+    /// even where it shows the same already, so that the time is that of drawing.
     ///
     /// # Errors
     /// When there is no such back end, or nothing was prepared.
@@ -128,6 +129,7 @@ impl Studio {
     ) -> Result<(Report, f64), StudioError> {
         let mut renderer = self.take(backend)?;
         let pool = &self.pool;
+        target.touch();
         let begin = Instant::now();
         let result = pool.install(|| renderer.render(frame, target, &Control::new(pool)));
         let time = milliseconds(begin);

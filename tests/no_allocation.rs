@@ -46,6 +46,7 @@ fn asked_for_in_a_second_frame(backend: &str, settings: &[(&str, &str)]) -> u64 
     let mut target = Framebuffer::new(96, 54, need.channels);
     let frame = need.frame();
     renderer.render(&frame, &mut target, &control).expect("a first frame");
+    target.touch();
     let before = ASKED.get();
     renderer.render(&frame, &mut target, &control).expect("a second frame");
     ASKED.get() - before

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// One plane of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -150,7 +151,15 @@ pub struct Framebuffer {
     albedo: Plane<Vec3>,
     shadow: Plane<f32>,
     coverage: Plane<f32>,
+    /// Changes whenever something may be written.
+    stamp: u64,
     _owner: Option<Owner>,
+}
+
+/// Returns a number that no picture had before.
+fn next_stamp() -> u64 {
+    static LAST: AtomicU64 = AtomicU64::new(0);
+    LAST.fetch_add(1, Ordering::Relaxed)
 }
 
 /// The numbers of one channel: the framebuffer's own, or in memory that it is lent.
@@ -167,6 +176,12 @@ struct Owner(#[expect(dead_code, reason = "it is there to be dropped")] Arc<dyn 
 impl std::fmt::Debug for Owner {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Owner")
+    }
+}
+
+impl<T> Plane<T> {
+    fn is_lent(&self) -> bool {
+        matches!(self, Self::Lent(_))
     }
 }
 
@@ -212,6 +227,7 @@ impl Framebuffer {
             albedo: Plane::Own(vec![Vec3::ZERO; len(Channel::Albedo)]),
             shadow: Plane::Own(vec![1.0; len(Channel::Shadow)]),
             coverage: Plane::Own(vec![0.0; len(Channel::Coverage)]),
+            stamp: next_stamp(),
             _owner: None,
         }
     }
@@ -247,6 +263,7 @@ impl Framebuffer {
             albedo: Plane::Lent(albedo),
             shadow: Plane::Lent(shadow),
             coverage: Plane::Lent(coverage),
+            stamp: next_stamp(),
             _owner: Some(Owner(owner)),
         })
     }
@@ -310,6 +327,8 @@ impl Framebuffer {
     pub fn exchange(&mut self, other: &mut Self, channels: Channels) {
         use std::mem::swap;
         assert_eq!((self.width, self.height), (other.width, other.height), "pictures of one size");
+        self.touch();
+        other.touch();
         for channel in channels.iter().filter(|&c| self.channels.has(c) && other.channels.has(c)) {
             match channel {
                 Channel::Color => swap(&mut self.color, &mut other.color),
@@ -321,6 +340,25 @@ impl Framebuffer {
                 Channel::Coverage => swap(&mut self.coverage, &mut other.coverage),
             }
         }
+    }
+
+    /// Returns what tells this content from that of every other picture and time: as long as it is the same, nothing was
+    /// written. Clones share it until they are written to. Nothing for lent memory, to which others may write.
+    #[must_use]
+    pub fn stamp(&self) -> Option<u64> {
+        let is_lent = self.color.is_lent()
+            || self.distance.is_lent()
+            || self.normal.is_lent()
+            || self.id.is_lent()
+            || self.albedo.is_lent()
+            || self.shadow.is_lent()
+            || self.coverage.is_lent();
+        (!is_lent).then_some(self.stamp)
+    }
+
+    /// Makes the content count as changed, so that a back end draws it again: what measures drawing asks for that.
+    pub fn touch(&mut self) {
+        self.stamp = next_stamp();
     }
 
     /// Returns the bytes held.
@@ -335,6 +373,7 @@ impl Framebuffer {
 
     /// Returns the whole picture as one band.
     pub fn band(&mut self) -> Band<'_> {
+        self.touch();
         Band {
             width: self.width,
             first_row: 0,

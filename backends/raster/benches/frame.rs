@@ -125,6 +125,12 @@ impl Stage {
     }
 
     fn render(&mut self) {
+        self.picture.touch();
+        self.render_again();
+    }
+
+    /// Draws into a picture that may show the same already.
+    fn render_again(&mut self) {
         let control = Control::new(&self.pool);
         self.raster.render(&self.need.frame(), &mut self.picture, &control).expect("a picture");
     }
@@ -148,6 +154,14 @@ fn scattered_triangles<const THREADS: usize>(bencher: Bencher, legs: u32) {
 fn frame(bencher: Bencher, mode: &str) {
     let mut stage = Stage::new(&[("mode", mode)]);
     bencher.bench_local(|| stage.render());
+}
+
+/// A frame in which nothing has changed.
+#[divan::bench]
+fn unchanged(bencher: Bencher) {
+    let mut stage = Stage::new(&[]);
+    stage.render();
+    bencher.bench_local(|| stage.render_again());
 }
 
 /// A frame whose edges are smoothed.

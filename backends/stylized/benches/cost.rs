@@ -102,6 +102,7 @@ fn measure(
     let mut above: Vec<Vec<Duration>> = vec![Vec::new(); renderers.len()];
     for frame in 0..frames + 2 {
         for (i, (_, renderer, target, times)) in renderers.iter_mut().enumerate() {
+            target.touch();
             let begin = Instant::now();
             let report = renderer.render(&need.frame(), target, &control)?;
             let time = begin.elapsed();

@@ -218,3 +218,45 @@ fn a_light_that_moves_has_its_map_redrawn_in_the_same_memory_and_others_are_kept
     scene.lights.pop();
     assert_eq!(before[..1], prepare(&scene)[..1]);
 }
+
+#[test]
+fn a_picture_that_shows_the_frame_already_is_not_drawn_again() {
+    let mut scene = Arc::new(mixed());
+    let need = need_of(camera([2.0, 1.7, 4.0], [0.0; 3]), 61, 47);
+    let (mut raster, control) = (Raster::new(), Control::simple());
+    let mut picture = Framebuffer::new(61, 47, need.channels);
+    let prepare = |raster: &mut Raster, scene: &Arc<Scene>, need: &Need| {
+        raster.prepare(scene, need, &Converter::default(), &control).unwrap();
+    };
+    // A frame that is drawn has phases, and gives the bytes that a new renderer draws.
+    let draws = |raster: &mut Raster, need: &Need, picture: &mut Framebuffer| {
+        raster.render(&need.frame(), picture, &control).unwrap().phases.iter().count() > 0
+    };
+    prepare(&mut raster, &scene, &need);
+    assert!(draws(&mut raster, &need, &mut picture));
+    let first = picture.clone();
+    assert!(!draws(&mut raster, &need, &mut picture));
+    prepare(&mut raster, &scene, &need);
+    assert!(!draws(&mut raster, &need, &mut picture));
+    assert!(picture.same_bits(&first));
+    // Something was written to it, it is another picture, or another frame.
+    picture.band().color.fill(Vec3::ONE);
+    assert!(draws(&mut raster, &need, &mut picture) && picture.same_bits(&first));
+    assert!(draws(&mut raster, &need, &mut Framebuffer::new(61, 47, need.channels)));
+    let aside = Need { camera: camera([2.0, 1.7, 4.001], [0.0; 3]), ..need.clone() };
+    assert!(draws(&mut raster, &aside, &mut picture) && !picture.same_bits(&first));
+    assert!(draws(&mut raster, &need, &mut picture) && picture.same_bits(&first));
+    // The host stopped it halfway.
+    let flag = AtomicBool::new(true);
+    let stopped = raster.render(&aside.frame(), &mut picture, &Control::simple().cancelled_by(&flag));
+    assert_eq!(stopped.unwrap_err(), RenderError::Cancelled);
+    assert!(draws(&mut raster, &need, &mut picture) && picture.same_bits(&first));
+    // Another scene, or other settings.
+    Arc::make_mut(&mut scene).lights[1].intensity = 1.0;
+    prepare(&mut raster, &scene, &need);
+    assert!(draws(&mut raster, &need, &mut picture) && !picture.same_bits(&first));
+    let mut flat = need.clone();
+    flat.settings.set("raster", &raster.info().parameters.clone(), "shading", "flat").unwrap();
+    prepare(&mut raster, &scene, &flat);
+    assert!(draws(&mut raster, &flat, &mut picture));
+}
