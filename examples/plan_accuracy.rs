@@ -18,7 +18,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if names.is_empty() {
         names = polyptych::builtin::NAMES.iter().map(|n| (*n).to_owned()).collect();
     }
-    let pace = Pace::of_this_machine(&Registry::builtin())?;
+    // Measured anew: what was kept may be from an hour when other programs ran.
+    let pace = Pace::measured(&Registry::builtin())?;
     for backend in BACKENDS {
         println!("{backend}: frames take {:.2} of what plans reckon with here", pace.factor(backend));
     }

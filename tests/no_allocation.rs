@@ -66,3 +66,11 @@ fn no_way_to_draw_triangles_asks_for_memory_in_a_second_frame() {
         assert_eq!(asked_for_in_a_second_frame("raster", &[setting]), 0, "{setting:?}");
     }
 }
+
+#[test]
+fn no_style_asks_for_memory_in_a_second_frame() {
+    for style in polyptych::stylized::STYLES {
+        let settings = [("preset", *style), ("wireframe", "true")];
+        assert_eq!(asked_for_in_a_second_frame("stylized", &settings), 0, "{style}");
+    }
+}

@@ -130,7 +130,8 @@ fn reflected(color: Vec3, diffuse: f32, shine: f32, radiance: Vec3) -> Vec3 {
 
 /// Raises cosines to the shininess; those that are not positive become 0.
 #[inline(always)]
-fn highlights(cosine: F32x8, shininess: f32) -> F32x8 {
+#[must_use]
+pub fn highlights(cosine: F32x8, shininess: f32) -> F32x8 {
     let zero = F32x8::splat(0.0);
     if !is_whole(shininess) {
         return F32x8(cosine.0.map(|c| if c > 0.0 { c.powf(shininess) } else { 0.0 }));

@@ -19,6 +19,10 @@ const LEAST: u32 = 48;
 const FRAMES: usize = 4;
 const SLOW_MS: f64 = 150.0;
 
+/// The reference draws the whole picture where it is expected to take no longer than this, milliseconds: errors then are
+/// known and not expected, also those in the few pixels that no pilot has.
+const RULER_MS: f64 = 1200.0;
+
 /// A picture, and the times of drawing it.
 pub(super) struct Pilot {
     pub(super) picture: Framebuffer,
@@ -53,13 +57,27 @@ pub(super) fn pilot(
 pub(super) struct Rulers {
     pub(super) sizes: [[u32; 2]; 2],
     pictures: [Framebuffer; 2],
+    /// The picture itself, where the reference is quick enough to draw it.
+    full: Option<Framebuffer>,
 }
 
 impl Rulers {
     pub(super) fn draw(studio: &mut Studio, scene: &Arc<Scene>, need: &Need) -> Result<Self, StudioError> {
         let sizes = sizes(need.width, need.height);
         let mut drawn = |size| pilot(studio, REFERENCE, scene, need, size);
-        Ok(Self { sizes, pictures: [drawn(sizes[0])?.picture, drawn(sizes[1])?.picture] })
+        let [small, large] = [drawn(sizes[0])?, drawn(sizes[1])?];
+        let ms = [small.ms, large.ms];
+        let mut rulers = Self { sizes, pictures: [small.picture, large.picture], full: None };
+        if rulers.extrapolated(ms, need) < RULER_MS {
+            let whole = Need { channels: Channels::COLOR, ..need.clone() };
+            rulers.full = Some(studio.draw(REFERENCE, scene, &whole)?.framebuffer);
+        }
+        Ok(rulers)
+    }
+
+    /// Tells the error of a picture of full size where the reference has drawn that, too.
+    pub(super) fn whole(&self, picture: &Framebuffer) -> Option<f64> {
+        color_rmse(picture, self.full.as_ref()?)
     }
 
     /// Lays a line through the times of two sizes: what a pixel costs, and what does not depend on pixels.
@@ -143,7 +161,7 @@ mod tests {
     #[test]
     fn time_is_what_pixels_cost_and_what_they_do_not() {
         let nothing = || Framebuffer::new(0, 0, Channels::COLOR);
-        let rulers = Rulers { sizes: [[100, 100], [200, 100]], pictures: [nothing(), nothing()] };
+        let rulers = Rulers { sizes: [[100, 100], [200, 100]], pictures: [nothing(), nothing()], full: None };
         let camera = crate::builtin::scene("cloud").unwrap().cameras.remove(0).1;
         let full = |ms: [f64; 2], width: u32| {
             let need = Need::new(camera.clone(), width, 100);
@@ -169,6 +187,7 @@ mod tests {
         let (sampled, all) =
             (rulers.sampled(&picture, &need).unwrap(), color_rmse(&picture, &truth).unwrap());
         assert!(all > 0.005 && (sampled / all - 1.0).abs() < 0.25, "{sampled} of {all}");
+        assert_eq!(rulers.whole(&picture), Some(all), "the reference is quick here");
         assert_eq!(rulers.sampled(&truth, &Need { width: 287, ..need.clone() }), None, "others are not");
         assert_eq!(sizes(1280, 720)[1], [256, 144]);
     }

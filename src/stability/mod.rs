@@ -14,6 +14,7 @@ pub use cases::cases;
 
 use crate::compare::REFERENCE;
 use crate::framebuffer::{Channel, Framebuffer};
+use crate::parallel::Threads as _;
 use crate::picture::{displayed, encode};
 use crate::seam::{Need, Settings};
 use crate::studio::{Studio, StudioError};
@@ -21,6 +22,8 @@ use count::{Count, Drawn, Trial};
 use scenes::Setup;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
 
 /// A way in which methods fail.
 pub struct Case {
@@ -185,9 +188,8 @@ impl Case {
             outcome.error.push(probe.error);
             outcome.ms.push(probe.ms);
             let next = self.values.get(index + 1).map_or(1.0, |next| next / value.max(1.0));
-            outcome.is_cut_short = self.count == Count::Growth
-                && next > 1.0
-                && (probe.ms + probe.prepare_ms) * next > PATIENCE_MS;
+            outcome.is_cut_short =
+                self.is_timed() && next > 1.0 && (probe.ms + probe.prepare_ms) * next > PATIENCE_MS;
             let is_broken = probe.error.is_nan() || probe.error > self.limit;
             if outcome.breaks_at.is_some() {
                 break;
@@ -213,6 +215,19 @@ impl Case {
         outcome
     }
 
+    /// Sweeps the plain way, and the better one where that breaks.
+    fn both_ways(&self, studio: &mut Studio, backend: &str) -> Vec<Outcome> {
+        let plain = self.sweep(studio, backend, false);
+        let better =
+            (self.better.is_some() && plain.breaks_at.is_some()).then(|| self.sweep(studio, backend, true));
+        std::iter::once(plain).chain(better).collect()
+    }
+
+    /// Tells whether times are what it counts.
+    fn is_timed(&self) -> bool {
+        self.count == Count::Growth
+    }
+
     /// Names the better way, where there is one.
     #[must_use]
     pub fn better(&self) -> Option<&'static str> {
@@ -227,34 +242,58 @@ fn pictures((value, probe): &(f64, Probe)) -> Vec<(f64, Vec<u8>)> {
     probe.picture.iter().chain(&probe.reference).filter_map(jpeg).collect()
 }
 
-/// Sweeps cases with back ends, and their better ways; `progress` is told before each with the share that is done.
+/// Sweeps cases with back ends, and their better ways; `progress` is told as they end how many are done, and which came last.
+///
+/// Pictures are too small to share, so each thread draws cases of its own, with a renderer of one thread. Cases about how
+/// cost grows come last, one by one with all threads: nothing else may take their time.
 pub fn stability(
     studio: &mut Studio,
     cases: &[Case],
     backends: &[String],
     progress: &mut dyn FnMut(usize, usize, &str),
 ) -> Vec<Outcome> {
-    let runs: Vec<(&Case, &String, bool)> = cases
+    let runs: Vec<(&Case, &String)> = cases
         .iter()
         .flat_map(|case| {
             let takes =
                 move |b: &&String| case.backends.is_empty() || case.backends.iter().any(|id| id == *b);
-            backends.iter().filter(takes).flat_map(move |b| {
-                let plain = std::iter::once((case, b, false));
-                plain.chain(case.better.is_some().then_some((case, b, true)))
-            })
+            backends.iter().filter(takes).map(move |b| (case, b))
         })
         .collect();
-    let mut outcomes: Vec<Outcome> = Vec::new();
-    for (i, (case, backend, is_better)) in runs.iter().enumerate() {
-        // What did not break needs no better way.
-        let is_idle = *is_better && outcomes.last().is_some_and(|o| o.breaks_at.is_none());
-        progress(i, runs.len(), &format!("{}: {backend}", case.id));
-        if !is_idle {
-            outcomes.push(case.sweep(studio, backend, *is_better));
+    let registry = studio.registry().clone();
+    let workers: Vec<Studio> =
+        (0..studio.pool().count()).filter_map(|_| Studio::new(registry.clone(), 1).ok()).collect();
+    let (timed, free): (Vec<usize>, Vec<usize>) =
+        (0..runs.len()).partition(|&i| workers.is_empty() || runs[i].0.is_timed());
+    let mut outcomes: Vec<Vec<Outcome>> = vec![Vec::new(); runs.len()];
+    let mut done = 0;
+    let mut ended = |index: usize, swept: Vec<Outcome>| {
+        done += 1;
+        progress(done, runs.len(), &format!("{}: {}", runs[index].0.id, runs[index].1));
+        outcomes[index] = swept;
+    };
+    let next = AtomicUsize::new(0);
+    let (sender, receiver) = channel();
+    std::thread::scope(|scope| {
+        for mut own in workers {
+            let (sender, next, free, runs) = (sender.clone(), &next, &free, &runs);
+            scope.spawn(move || {
+                while let Some(&index) = free.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let (case, backend) = runs[index];
+                    if sender.send((index, case.both_ways(&mut own, backend))).is_err() {
+                        return;
+                    }
+                }
+            });
         }
+        drop(sender);
+        receiver.iter().for_each(|(index, swept)| ended(index, swept));
+    });
+    for index in timed {
+        let (case, backend) = runs[index];
+        ended(index, case.both_ways(studio, backend));
     }
-    outcomes
+    outcomes.into_iter().flatten().collect()
 }
 
 /// A load is not raised any further where the next would take longer than this, milliseconds.

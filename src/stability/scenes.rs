@@ -3,6 +3,7 @@
 use crate::builtin;
 use crate::camera::{Camera, Projection};
 use crate::compare::compared_channels;
+use crate::framebuffer::Channels;
 use crate::prelude::{
     DAffine3, DQuat, DVec2, DVec3, Form, FreeForm, HeightField, Light, Material, Mesh, Need, Object,
     Primitive, Scene, Shape, Vec3, Voxels,
@@ -426,5 +427,7 @@ pub(super) fn pixels(rows: f64) -> Setup {
     let camera = front(&scene);
     let mut setup = setup(scene, camera);
     (setup.need.width, setup.need.height) = (rows as u32 * 16 / 9, rows as u32);
+    // Time is counted, and nothing compared.
+    setup.need.channels = Channels::COLOR;
     Setup { load: rows * rows, ..setup }
 }

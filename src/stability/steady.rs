@@ -76,7 +76,14 @@ impl Editor<'_> {
 /// Edits the scene while a frame is drawn, once letting the frame end and once stopping it. The frame that ends must show the
 /// scene as it was, the next one the scene as it is: counts the pixels of either that do not.
 pub(super) fn edited_midway(studio: &mut Studio, backend: &str, own: &Setup) -> Result<Drawn, StudioError> {
-    let mut error = 0.0_f64;
+    let pool = studio.pool().clone();
+    let as_it_was = draw(&mut fresh(studio, pool.count())?, backend, own)?.0;
+    let mut edited = own.scene.clone();
+    (own.edit)(Arc::make_mut(&mut edited));
+    let now = Setup { scene: edited, ..own.clone() };
+    let as_it_is = draw(&mut fresh(studio, pool.count())?, backend, &now)?.0;
+    // An edit that does not show tells nothing.
+    let mut error = f64::from(u8::from(differing(&as_it_is, &as_it_was) == 0.0));
     let mut last = None;
     for stops in [false, true] {
         draw(studio, backend, own)?;
@@ -89,7 +96,6 @@ pub(super) fn edited_midway(studio: &mut Studio, backend: &str, own: &Setup) -> 
             stop: stops.then_some(&stop),
         };
         let mut picture = Framebuffer::new(own.need.width, own.need.height, own.need.channels);
-        let pool = studio.pool().clone();
         let renderer = studio.renderer(backend)?;
         let drawn = pool.install(|| {
             let control = Control::new(&pool).watched_by(&editor).cancelled_by(&stop);
@@ -98,24 +104,18 @@ pub(super) fn edited_midway(studio: &mut Studio, backend: &str, own: &Setup) -> 
         if editor.bands.load(Ordering::Relaxed) < editor.after {
             editor.edit();
         }
-        let before = draw(&mut fresh(studio, pool.count())?, backend, own)?.0;
         match drawn {
-            Ok(_) => error = error.max(differing(&picture, &before)),
+            Ok(_) => error = error.max(differing(&picture, &as_it_was)),
             Err(RenderError::Cancelled) if stops => {}
             Err(error) => return Err(StudioError::Render { backend: backend.to_owned(), error }),
         }
         let scene = editor.live.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let now = Setup { scene, ..own.clone() };
-        let (picture, ms) = draw(studio, backend, &now)?;
-        let reference = draw(&mut fresh(studio, pool.count())?, backend, &now)?.0;
-        error = error.max(differing(&picture, &reference));
-        // An edit that does not show tells nothing.
-        error = error.max(f64::from(u8::from(differing(&reference, &before) == 0.0)));
-        last = Some((ms, picture, reference));
+        let (picture, ms) = draw(studio, backend, &Setup { scene, ..own.clone() })?;
+        error = error.max(differing(&picture, &as_it_is));
+        last = Some((ms, picture));
     }
-    let (ms, picture, reference) =
-        last.ok_or_else(|| StudioError::Threads("nothing was drawn".to_owned()))?;
-    Ok(against(error, ms, picture, reference))
+    let (ms, picture) = last.ok_or_else(|| StudioError::Threads("nothing was drawn".to_owned()))?;
+    Ok(against(error, ms, picture, as_it_is))
 }
 
 /// Counts the pixels at which a form is not met where counting the roots along the ray says.

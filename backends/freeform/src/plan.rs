@@ -22,7 +22,7 @@ mod nanoseconds {
     /// A ray into a grid of distances, for each sample along its longest edge.
     pub(super) const FIELD: f64 = 9.0;
     /// A sample of a volume, with what it takes to light it.
-    pub(super) const SAMPLE: f64 = 45.0;
+    pub(super) const SAMPLE: f64 = 56.25;
     /// A surface.
     pub(super) const SURFACE: f64 = 60.0;
     /// A light on it.

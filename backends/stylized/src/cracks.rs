@@ -68,13 +68,18 @@ impl Scratch {
             row.clear();
             row.resize(width + 1, None);
         }
-        self.set.iter_mut().for_each(Vec::clear);
+        // Which of the two is above changes from row to row, so neither may be too small for any.
+        for set in &mut self.set {
+            set.clear();
+            set.reserve(width);
+        }
         self.touched.clear();
         self.strokes.clear();
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.down.capacity() * 3 * size_of::<Option<Crack>>() + self.strokes.capacity() * size_of::<Stroke>()
+        self.down.capacity() * (3 * size_of::<Option<Crack>>() + 8)
+            + self.strokes.capacity() * size_of::<Stroke>()
     }
 }
 

@@ -6,7 +6,7 @@ use crate::style::{Highlight, Style};
 use glam::{Mat3, Vec3};
 use polyptych_core::camera::Projection;
 use polyptych_core::lanes::{F32x8, I32x8, LANES, Mask8, Vec3x8};
-use polyptych_core::shade::highlight;
+use polyptych_core::shade::{highlight, highlights};
 
 impl Painting<'_> {
     /// Adds highlights.
@@ -212,25 +212,15 @@ fn turned(by: &Mat3, v: Vec3x8) -> Vec3x8 {
         + Vec3x8::splat(by.z_axis).scaled(v.z)
 }
 
-/// Raises cosines to their exponents: all at once where these are one whole number, which they mostly are.
+/// Raises cosines to their exponents: all at once where these are one, which they mostly are.
 #[inline(always)]
 fn powers(cosine: F32x8, shininess: &[f32; LANES]) -> F32x8 {
-    let exponent = shininess[0];
-    let is_whole = exponent.fract() == 0.0 && (1.0..=65536.0).contains(&exponent);
-    if !(is_whole && shininess.iter().all(|&s| s == exponent)) {
-        let mut all = cosine;
-        for (power, &exponent) in all.0.iter_mut().zip(shininess) {
-            *power = highlight(*power, exponent);
-        }
-        return all;
+    if shininess.iter().all(|&s| s == shininess[0]) {
+        return highlights(cosine, shininess[0]);
     }
-    let (mut power, mut result, mut left) = (cosine, F32x8::splat(1.0), exponent as u32);
-    while left > 0 {
-        if left & 1 == 1 {
-            result = result * power;
-        }
-        power = power * power;
-        left >>= 1;
+    let mut all = cosine;
+    for (power, &exponent) in all.0.iter_mut().zip(shininess) {
+        *power = highlight(*power, exponent);
     }
-    result
+    all
 }

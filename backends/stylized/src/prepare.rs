@@ -110,6 +110,19 @@ impl Outlines {
     }
 }
 
+/// Foretells the bytes of the edges of a scene's meshes; those of polyhedra are few.
+pub(crate) fn outlines_forecast(scene: &Scene) -> u64 {
+    let mut counted: Vec<*const Shape> = Vec::new();
+    let bytes_of = |object: &Object| match &*object.shape {
+        Shape::Mesh(mesh) if object.is_drawable() && !counted.contains(&Arc::as_ptr(&object.shape)) => {
+            counted.push(Arc::as_ptr(&object.shape));
+            Edges::forecast(mesh)
+        }
+        _ => 0,
+    };
+    scene.objects.iter().map(bytes_of).sum()
+}
+
 /// Tells whether what is drawn of an object has the faces that it was given.
 fn keeps_faces(decision: &Decision) -> bool {
     match decision {

@@ -8,7 +8,7 @@ use crate::light::Lighting;
 use crate::outline::{self, Sight, keeps_lines};
 use crate::paint::{Look, Painting, ROWS, Scratch};
 use crate::paper::Grain;
-use crate::prepare::{Coded, Outlines, colorful, looks};
+use crate::prepare::{Coded, Outlines, colorful, looks, outlines_forecast};
 use crate::preset::Preset;
 use crate::stroke::Stroke;
 use crate::style::Styles;
@@ -206,6 +206,8 @@ impl Renderer for Stylized {
             if hatches { "dark tones have strokes" } else { "the style has no strokes" },
         ));
         plan.passes.push(pass("contours", lines, if lines { "lines are on" } else { "lines are off" }));
+        let maps: u64 = styles.all.iter().filter_map(|s| s.hatching.as_ref()).map(|h| h.bytes()).sum();
+        plan.bytes += self.grain.bytes() + maps + if lines { outlines_forecast(scene) } else { 0 };
         // Nanoseconds that a pixel of the background and one of a surface take for tone, strokes and lines, on the
         // machine that all back ends' constants were measured on.
         let surface = 14.0 + if hatches { 16.0 } else { 0.0 } + if lines { 6.0 } else { 0.0 };

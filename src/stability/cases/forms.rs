@@ -362,6 +362,9 @@ fn volume_step(step: f64) -> Setup {
     let mut setup = of_volume(|p| (1.0 - p.length() * 0.9).clamp(0.0, 1.0) as f32, front());
     setup.settings.push(("volume.step", step.to_string()));
     setup.ruler_settings.push(("volume.step", "0.05".to_owned()));
+    // A ruler of steps so small is slow, and color changes gently across a cloud.
+    (setup.need.width, setup.need.height) =
+        (super::super::scenes::WIDTH * 2 / 3, super::super::scenes::HEIGHT * 2 / 3);
     setup
 }
 

@@ -116,14 +116,15 @@ fn shuffled_ball(shuffle: f64) -> Setup {
 
 /// Hills of voxels, and a box that is dug out of them when so many bands are finished.
 fn edited_hills(bands: f64) -> Setup {
-    const EDGE: u32 = 72;
+    // Both the hills and the hole reach into a second chunk of 64 cells.
+    const SIZE: [u32; 3] = [72, 42, 40];
     let mut scene = studio();
-    let hills = Voxels::from_fn([EDGE; 3], |x, y, z| {
+    let hills = Voxels::from_fn(SIZE, |x, y, z| {
         let height = 24.0 + 8.0 * (f64::from(x) * 0.15).sin() + 8.0 * (f64::from(z) * 0.11).cos();
         u8::from(f64::from(y) < height)
     });
     scene.objects.push(Object { materials: vec![0, 1], ..Object::new("hills", Shape::Voxels(hills), 0) });
-    let view = look(DVec3::new(100.0, 80.0, 130.0), DVec3::new(36.0, 20.0, 36.0), 0.6);
+    let view = look(DVec3::new(100.0, 80.0, 114.0), DVec3::new(36.0, 18.0, 20.0), 0.6);
     Setup { load: bands, edit: dig, ..setup(scene, view) }
 }
 
@@ -132,7 +133,7 @@ fn dig(scene: &mut Scene) {
     if let Shape::Voxels(voxels) = Arc::make_mut(&mut object.shape) {
         for i in 0..24 * 40 * 24 {
             let [x, y, z] = [i % 24, i / 24 % 40, i / 960];
-            voxels.set(44 + x, y, 44 + z, if y < 3 { 2 } else { 0 });
+            voxels.set(44 + x, y, 14 + z, if y < 3 { 2 } else { 0 });
         }
     }
 }
