@@ -17,6 +17,7 @@
 
 pub use polyptych_core::{camera, convert, framebuffer, load, math, metrics, parallel, scene, seam, shade};
 
+pub mod animate;
 pub mod auto;
 pub mod builtin;
 pub mod chart;

@@ -5,8 +5,13 @@ use super::{Measure, Point};
 /// Returns the indices of points that no other beats in both time and error, fastest first.
 #[must_use]
 pub fn front(points: &[&Point], measure: Measure) -> Vec<usize> {
-    let mut order: Vec<(usize, f64, f64)> =
-        points.iter().enumerate().filter_map(|(i, p)| Some((i, p.ms.median, measure.of(p)?))).collect();
+    let known = points.iter().enumerate().filter_map(|(i, p)| Some((i, p.ms.median, measure.of(p)?)));
+    undominated(known.collect())
+}
+
+/// Returns which of some things, each with its time and its error, no other beats in both, fastest first.
+#[must_use]
+pub fn undominated(mut order: Vec<(usize, f64, f64)>) -> Vec<usize> {
     order.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
     let mut least = f64::INFINITY;
     order.retain(|&(_, _, error)| {

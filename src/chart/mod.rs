@@ -11,7 +11,7 @@ mod measure;
 mod sweep;
 
 pub use axes::{QualityAxis, quality_axes};
-pub use front::{best_within, fastest_under, front};
+pub use front::{best_within, fastest_under, front, undominated};
 pub(crate) use growth::ball;
 pub use growth::{Growth, Quantity};
 pub use sweep::AxisWalk;

@@ -26,6 +26,8 @@ pub(super) enum Command {
     Plan(PlanArguments),
     /// Time frames.
     Bench(BenchArguments),
+    /// Draw the frames of a turntable, or of a flight through a scene's cameras.
+    Animate(AnimateArguments),
     /// Convert a scene into a model of triangles, voxels or distances.
     Convert(ConvertArguments),
     /// List the back ends with what they draw and their parameters.
@@ -153,6 +155,32 @@ pub(super) struct BenchArguments {
     /// Move the camera around the scene with every frame.
     #[arg(long)]
     pub(super) orbit: bool,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct AnimateArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    #[command(flatten)]
+    pub(super) draw: DrawArguments,
+    /// Folder for the frames, or a .gif or .apng. Frames that are there already are not drawn again.
+    #[arg(short, long, value_name = "DIR|FILE", default_value = "out/animate")]
+    pub(super) output: PathBuf,
+    /// Turn the camera once around the scene; otherwise it flies through the scene's cameras.
+    #[arg(long)]
+    pub(super) turntable: bool,
+    /// Draw these frames: from A up to, but without, B.
+    #[arg(long, value_name = "A..B", value_parser = frames)]
+    pub(super) frames: Option<[u32; 2]>,
+    /// Frames of the whole animation (the end of --frames, or 120).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(super) count: Option<u32>,
+    /// Draw each N-th frame only, beginning with the K-th: one of N processes that share the work.
+    #[arg(long, value_name = "K/N", value_parser = shard)]
+    pub(super) shard: Option<[u32; 2]>,
+    /// Frames a second of a .gif or .apng.
+    #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u16).range(1..=100))]
+    pub(super) fps: u16,
 }
 
 #[derive(Args, Debug)]
@@ -367,6 +395,21 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once('x').ok_or_else(refuse)?;
     let parse = |s: &str| s.parse().ok().filter(|n| (1..=16_384).contains(n)).ok_or_else(refuse);
     Ok([parse(width)?, parse(height)?])
+}
+
+fn frames(text: &str) -> Result<[u32; 2], String> {
+    let refuse = || "write A..B with whole numbers, A less than B, B at most 100000".to_owned();
+    let (first, end) = text.split_once("..").ok_or_else(refuse)?;
+    let [first, end]: [u32; 2] = [first.parse().map_err(|_| refuse())?, end.parse().map_err(|_| refuse())?];
+    if first < end && end <= 100_000 { Ok([first, end]) } else { Err(refuse()) }
+}
+
+fn shard(text: &str) -> Result<[u32; 2], String> {
+    let refuse = || "write K/N with whole numbers, K from 1 to N".to_owned();
+    let (shard, shards) = text.split_once('/').ok_or_else(refuse)?;
+    let [shard, shards]: [u32; 2] =
+        [shard.parse().map_err(|_| refuse())?, shards.parse().map_err(|_| refuse())?];
+    if (1..=shards).contains(&shard) { Ok([shard, shards]) } else { Err(refuse()) }
 }
 
 fn pixel(text: &str) -> Result<[u32; 2], String> {

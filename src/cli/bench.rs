@@ -2,8 +2,7 @@
 
 use super::arguments::BenchArguments;
 use super::{Failure, auto, input, print};
-use glam::{DMat3, DVec3};
-use polyptych::camera::Camera;
+use polyptych::animate::turned;
 use polyptych::framebuffer::Framebuffer;
 use polyptych::parallel::Threads;
 use polyptych::seam::{Frame, Need, Report};
@@ -65,16 +64,6 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
         print(&table(&rows));
     }
     Ok(())
-}
-
-/// Turns a camera around the vertical axis through a point.
-fn turned(camera: &Camera, center: DVec3, angle: f64) -> Camera {
-    let turn = DMat3::from_rotation_y(angle);
-    Camera {
-        eye: center + turn * (camera.eye - center),
-        world_from_camera: turn * camera.world_from_camera,
-        projection: camera.projection.clone(),
-    }
 }
 
 fn table(rows: &[Value]) -> String {

@@ -1,5 +1,6 @@
 //! The command: one file for each subcommand, and one place where errors become exit codes.
 
+mod animate;
 mod arguments;
 mod auto;
 mod backends;
@@ -63,6 +64,7 @@ pub(crate) fn run() -> ExitCode {
         Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
+        Some(Command::Animate(arguments)) => animate::run(&arguments),
         Some(Command::Convert(arguments)) => convert::run(&arguments),
         Some(Command::Backends(arguments)) => backends::run(&arguments),
         Some(Command::Validate(arguments)) => validate::run(&arguments),

@@ -1,6 +1,7 @@
 //! Where do two pictures differ, and by how much? Reckoned on a thread of its own, the newest pictures last.
 
-use eframe::egui::{self, Color32, Pos2, Rect, TextureHandle, TextureOptions};
+use crate::pane::Poster;
+use eframe::egui::{self, Color32, ColorImage, Rect, TextureOptions};
 use polyptych::framebuffer::{Channel, Framebuffer};
 use polyptych::metrics::{Errors, display_colors};
 use std::sync::Arc;
@@ -17,7 +18,7 @@ struct Subject {
 struct Finding {
     subject: Subject,
     errors: Errors,
-    pixels: Vec<[u8; 3]>,
+    map: Arc<ColorImage>,
 }
 
 /// Compares pictures as they come.
@@ -25,7 +26,9 @@ struct Finding {
 pub(crate) struct Comparer {
     finding: Option<Finding>,
     running: Option<Receiver<Finding>>,
-    texture: Option<TextureHandle>,
+    poster: Poster,
+    /// How many comparisons were done.
+    count: usize,
 }
 
 impl Subject {
@@ -36,8 +39,10 @@ impl Subject {
 
     fn find(self) -> Finding {
         let [a, b] = &self.pictures;
-        let pixels = errors_of(a, b, self.channel).into_iter().map(heat).collect();
-        Finding { errors: Errors::between(a, b), pixels, subject: self }
+        let colors = errors_of(a, b, self.channel).into_iter().map(heat);
+        let pixels = colors.map(|[r, g, b]| Color32::from_rgb(r, g, b)).collect();
+        let map = Arc::new(ColorImage::new([a.width() as usize, a.height() as usize], pixels));
+        Finding { errors: Errors::between(a, b), map, subject: self }
     }
 }
 
@@ -59,8 +64,9 @@ impl Comparer {
         if let Some(running) = &self.running {
             match running.try_recv() {
                 Ok(finding) => {
-                    self.show(&finding, ctx);
+                    self.poster.show(finding.map.clone(), TextureOptions::NEAREST, ctx);
                     (self.finding, self.running) = (Some(finding), None);
+                    self.count += 1;
                 }
                 Err(TryRecvError::Empty) => {}
                 Err(TryRecvError::Disconnected) => self.running = None,
@@ -81,28 +87,25 @@ impl Comparer {
         false
     }
 
-    fn show(&mut self, finding: &Finding, ctx: &egui::Context) {
-        let picture = &finding.subject.pictures[0];
-        let size = [picture.width() as usize, picture.height() as usize];
-        let image = egui::ColorImage::from_rgb(size, finding.pixels.as_flattened());
-        match &mut self.texture {
-            Some(texture) => texture.set(image, TextureOptions::NEAREST),
-            None => self.texture = Some(ctx.load_texture("difference", image, TextureOptions::NEAREST)),
-        }
-    }
-
     /// Draws the map of errors.
     pub(crate) fn draw(&self, painter: &egui::Painter, rect: Rect) {
-        let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-        match &self.texture {
-            Some(texture) => drop(painter.image(texture.id(), rect, whole, Color32::WHITE)),
-            None => drop(painter.rect_filled(rect, 0.0, Color32::from_gray(32))),
-        }
+        self.poster.draw(painter, rect);
     }
 
     /// Returns the map of errors, row by row.
-    pub(crate) fn pixels(&self) -> Option<&[[u8; 3]]> {
-        self.finding.as_ref().map(|finding| &finding.pixels[..])
+    pub(crate) fn pixels(&self) -> Option<Vec<[u8; 3]>> {
+        let map = &self.finding.as_ref()?.map;
+        Some(map.pixels.iter().map(|p| [p.r(), p.g(), p.b()]).collect())
+    }
+
+    /// Returns how many comparisons were done.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Returns the root mean square error of the color, full scale 1.
+    pub(crate) fn rmse(&self) -> Option<f64> {
+        self.finding.as_ref()?.errors.color.as_ref().map(|color| color.rmse)
     }
 
     /// Says in a few words how far apart the pictures are.

@@ -1,10 +1,10 @@
-//! `polyptych-viewer [--plugin-dir FOLDER]... [--trust-plugins] [SCENE]`: opens a scene file, a model, or
-//! `builtin:NAME`, and shows it.
+//! `polyptych-viewer [--plugin-dir FOLDER]... [--trust-plugins] [--script FILE] [SCENE]`: opens a scene file, a model,
+//! or `builtin:NAME`, and shows it.
 
 use polyptych::BuiltinBackends;
 use polyptych::plugins::{self, Isolation, Options, PluginBackends, plugin_folders};
 use polyptych::seam::Registry;
-use polyptych_viewer::{Viewer, open, show_viewer};
+use polyptych_viewer::{Script, Viewer, data_folder, open, show_viewer};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -13,23 +13,27 @@ const WRONG_USE: u8 = 2;
 /// Exit code for a refused input, as the command has it.
 const REFUSED: u8 = 3;
 
-const USAGE: &str = "polyptych-viewer [--plugin-dir FOLDER]... [--trust-plugins] [SCENE]: a scene file, a model, or \
-                     builtin:NAME";
+const USAGE: &str = "polyptych-viewer [--plugin-dir FOLDER]... [--trust-plugins] [--script FILE] [SCENE]: a scene file, \
+                     a model, or builtin:NAME";
 
 /// What was asked for.
 struct Arguments {
     scene: String,
     plugin_folders: Vec<PathBuf>,
     trust_plugins: bool,
+    /// A session that goes by itself.
+    script: Option<PathBuf>,
 }
 
 impl Arguments {
     fn read(words: impl Iterator<Item = String>) -> Option<Self> {
         let (mut scene, mut words) = (None, words);
-        let mut asked = Self { scene: String::new(), plugin_folders: Vec::new(), trust_plugins: false };
+        let mut asked =
+            Self { scene: String::new(), plugin_folders: Vec::new(), trust_plugins: false, script: None };
         while let Some(word) = words.next() {
             match word.as_str() {
                 "--plugin-dir" => asked.plugin_folders.push(words.next()?.into()),
+                "--script" => asked.script = Some(words.next()?.into()),
                 "--trust-plugins" => asked.trust_plugins = true,
                 _ if word.starts_with('-') || scene.is_some() => return None,
                 _ => scene = Some(word),
@@ -71,6 +75,15 @@ fn run(arguments: &Arguments) -> Result<(), (u8, String)> {
     let scene = open(&arguments.scene).map_err(|why| (REFUSED, why))?;
     let mut viewer = Viewer::new(registry, scene).map_err(|e| (1, e.to_string()))?;
     viewer.list_refused(refused.iter().map(ToString::to_string));
+    viewer.name_scene(&arguments.scene);
+    if let Some(file) = &arguments.script {
+        // A scripted session is the same for everyone: nothing of other sessions is in it.
+        let refuse = |why: String| (REFUSED, format!("{}: {why}", file.display()));
+        let text = std::fs::read_to_string(file).map_err(|e| refuse(e.to_string()))?;
+        viewer.follow(Script::read(&text).map_err(refuse)?);
+    } else if let Some(folder) = data_folder() {
+        viewer.keep_in(folder);
+    }
     show_viewer(viewer).map_err(|e| (1, e.to_string()))
 }
 
@@ -81,7 +94,9 @@ mod tests {
     #[test]
     fn words_are_read_or_refused() {
         let read = |words: &[&str]| Arguments::read(words.iter().map(|w| (*w).to_owned()));
-        let asked = read(&["--plugin-dir", "a", "b.obj", "--plugin-dir", "c", "--trust-plugins"]).unwrap();
+        let words = ["--plugin-dir", "a", "b.obj", "--plugin-dir", "c", "--trust-plugins", "--script", "d"];
+        let asked = read(&words).unwrap();
+        assert_eq!(asked.script, Some(PathBuf::from("d")));
         assert_eq!((asked.scene.as_str(), asked.trust_plugins), ("b.obj", true));
         assert_eq!(asked.plugin_folders, [PathBuf::from("a"), PathBuf::from("c")]);
         assert_eq!(read(&[]).unwrap().scene, "builtin:atelier");

@@ -1,11 +1,49 @@
 //! How is the picture of one back end shown, with its name, its time, and what it did to the scene?
 
 use crate::difference::Comparer;
-use crate::painter::{Painter, Painting};
-use eframe::egui::{self, Color32, Pos2, Rect, RichText, TextureHandle, TextureOptions, Vec2};
+use crate::painter::{News, Order, Painter, Painting};
+use eframe::egui::{self, Color32, ColorImage, Pos2, Rect, RichText, TextureHandle, TextureOptions, Vec2};
 use polyptych::framebuffer::Channel;
 use polyptych::scene::Scene;
 use polyptych::seam::Decision;
+use std::sync::Arc;
+
+/// A picture on the graphics card.
+#[derive(Default)]
+pub(crate) struct Poster {
+    /// Kept to be handed over again where the card loses it.
+    image: Option<Arc<ColorImage>>,
+    texture: Option<TextureHandle>,
+}
+
+impl Poster {
+    pub(crate) fn show(&mut self, image: Arc<ColorImage>, options: TextureOptions, ctx: &egui::Context) {
+        self.image = Some(image.clone());
+        match &mut self.texture {
+            Some(texture) => texture.set(image, options),
+            None => self.texture = Some(ctx.load_texture("picture", image, options)),
+        }
+    }
+
+    /// Hands the picture over again if the card does not have it any more.
+    fn restore(&mut self, ctx: &egui::Context) {
+        let is_lost = self.texture.as_ref().is_some_and(|t| ctx.tex_manager().read().meta(t.id()).is_none());
+        if let (true, Some(image)) = (is_lost, self.image.clone()) {
+            // Nobody else has that name: it must not be given back.
+            self.texture.take().into_iter().for_each(std::mem::forget);
+            self.show(image, TextureOptions::LINEAR, ctx);
+        }
+    }
+
+    /// Draws the picture into a rectangle.
+    pub(crate) fn draw(&self, painter: &egui::Painter, rect: Rect) {
+        let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+        match &self.texture {
+            Some(texture) => drop(painter.image(texture.id(), rect, whole, Color32::WHITE)),
+            None => drop(painter.rect_filled(rect, 0.0, Color32::from_gray(32))),
+        }
+    }
+}
 
 /// A back end's place in the window.
 pub(crate) struct Pane {
@@ -14,8 +52,12 @@ pub(crate) struct Pane {
     pub(crate) painter: Painter,
     /// Size of the picture that is shown, in pixels of the screen.
     pub(crate) size: [u32; 2],
+    /// What was ordered last.
+    ordered: Option<Order>,
+    /// Whether there is something to order as soon as the other panes are done.
+    pub(crate) waits: bool,
     shown: Option<Painting>,
-    texture: Option<TextureHandle>,
+    poster: Poster,
     pub(crate) failure: Option<String>,
     /// The picture held against the reference's.
     pub(crate) error: Comparer,
@@ -28,26 +70,43 @@ impl Pane {
             channel,
             painter,
             size: [0, 0],
+            ordered: None,
+            waits: false,
             shown: None,
-            texture: None,
+            poster: Poster::default(),
             failure: None,
             error: Comparer::default(),
         }
     }
 
+    /// Orders a picture, unless it is the one that was ordered last.
+    pub(crate) fn want(&mut self, order: Order) {
+        if !self.has_ordered(&order) {
+            self.ordered = Some(order.clone());
+            self.painter.order(order);
+        }
+    }
+
+    /// Tells whether the same picture was ordered last.
+    pub(crate) fn has_ordered(&self, order: &Order) -> bool {
+        self.ordered.as_ref().is_some_and(|ordered| ordered.is(order))
+    }
+
+    /// Orders the same picture anew: after a failure.
+    pub(crate) fn try_again(&mut self) {
+        (self.ordered, self.failure) = (None, None);
+    }
+
     /// Takes what the painter has finished since the last time.
     pub(crate) fn update(&mut self, ctx: &egui::Context) {
+        self.poster.restore(ctx);
         match self.painter.take() {
             None => {}
-            Some(Err(why)) => self.failure = Some(why),
-            Some(Ok(painting)) => {
+            Some(News::Failure(why)) => self.failure = Some(why),
+            Some(News::Parts(image)) => self.poster.show(Arc::new(image), TextureOptions::LINEAR, ctx),
+            Some(News::Painting(painting)) => {
                 self.failure = None;
-                let bytes = painting.pixels.as_flattened();
-                let image = egui::ColorImage::from_rgb(painting.size, bytes);
-                match &mut self.texture {
-                    Some(texture) => texture.set(image, TextureOptions::LINEAR),
-                    None => self.texture = Some(ctx.load_texture("picture", image, TextureOptions::LINEAR)),
-                }
+                self.poster.show(painting.image.clone(), TextureOptions::LINEAR, ctx);
                 self.shown = Some(painting);
             }
         }
@@ -61,17 +120,19 @@ impl Pane {
     /// Tells whether the full picture of what was ordered last is shown, or why there is none.
     pub(crate) fn is_at_rest(&self) -> bool {
         let full = self.shown.as_ref().is_some_and(|p| p.is_full && p.backend == self.backend);
-        !self.painter.is_busy() && (full || self.failure.is_some())
+        let has_room = !self.size.contains(&0);
+        !self.painter.is_busy() && (full || self.failure.is_some() || !has_room)
     }
 
     /// Draws the picture into a rectangle, or the part of it inside `clip`.
     pub(crate) fn draw(&self, painter: &egui::Painter, rect: Rect, clip: Rect) {
-        let painter = painter.with_clip_rect(clip.intersect(painter.clip_rect()));
-        let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-        match &self.texture {
-            Some(texture) => drop(painter.image(texture.id(), rect, whole, Color32::WHITE)),
-            None => drop(painter.rect_filled(rect, 0.0, Color32::from_gray(32))),
-        }
+        self.poster.draw(&painter.with_clip_rect(clip.intersect(painter.clip_rect())), rect);
+    }
+
+    /// Says in a line what is shown: for sheets.
+    pub(crate) fn caption(&self, shows_error: bool) -> String {
+        let error = self.error.summary().filter(|_| shows_error).map_or(String::new(), |e| format!(", {e}"));
+        format!("{}, {}, {}{error}", self.backend, self.channel.name(), self.status())
     }
 
     /// Says how long the picture took, or why there is none.
@@ -81,11 +142,11 @@ impl Pane {
         }
         let Some(painting) = &self.shown else { return "drawing".to_owned() };
         let busy = if self.painter.is_busy() || !painting.is_full { " ..." } else { "" };
-        format!("{:.1} ms{busy}", painting.frame.as_secs_f64() * 1e3)
+        let coarse = if painting.coarse > 1 { format!(", 1/{}", painting.coarse) } else { String::new() };
+        format!("{:.1} ms{coarse}{busy}", painting.frame.as_secs_f64() * 1e3)
     }
 
     /// Shows the line above the picture: back end, channel, time, and the badge with what was not drawn exactly.
-    /// Tells whether something was chosen.
     pub(crate) fn header(
         &mut self,
         ui: &mut egui::Ui,
@@ -93,8 +154,7 @@ impl Pane {
         number: usize,
         scene: &Scene,
         shows_error: bool,
-    ) -> bool {
-        let before = (self.backend.clone(), self.channel);
+    ) {
         // On one line: pictures of panes with headers of different heights would have different sizes.
         ui.horizontal(|ui| {
             let chosen = egui::ComboBox::from_id_salt(("back end", number))
@@ -120,7 +180,8 @@ impl Pane {
                 if self.failure.is_some() { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
             let status = ui.label(RichText::new(self.status()).color(color));
             if let Some(painting) = &self.shown {
-                status.on_hover_text(format!("prepared in {:.1} ms", painting.prepare.as_secs_f64() * 1e3));
+                let (prepare, megabytes) = (painting.prepare.as_secs_f64() * 1e3, painting.bytes as f64 * 1e-6);
+                status.on_hover_text(format!("prepared in {prepare:.1} ms, holds {megabytes:.1} MB"));
             }
             if let Some(error) = self.error.summary().filter(|_| shows_error) {
                 let first = error.split(", ").next().unwrap_or_default().to_owned();
@@ -129,9 +190,11 @@ impl Pane {
                      that show the same object; mean error of the distance over the distance.)"
                 ));
             }
+            if self.failure.is_some() && ui.button("Try again").clicked() {
+                self.try_again();
+            }
             self.badge(ui, number, scene);
         });
-        before != (self.backend.clone(), self.channel)
     }
 
     /// Shows how many objects were not drawn as given; a click lists them.

@@ -1,0 +1,84 @@
+//! Can everything be done from the palette and by keys?
+
+use crate::harness::{press, rest, window};
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use polyptych_viewer::{ACTIONS, Action, Mode};
+
+#[test]
+fn every_action_of_the_palette_runs_once() {
+    let mut harness = window("polyhedra");
+    // Screenshots and sheets go to the current folder.
+    let folder = std::env::temp_dir().join(format!("polyptych-actions-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    for entry in ACTIONS.iter().filter(|e| !matches!(e.action, Action::Screenshot | Action::Sheet)) {
+        let before = harness.state().is_on(entry.action);
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+        harness.run_steps(2);
+        assert!(
+            harness.query_by_label("What do you want to do?").is_some(),
+            "{}: the palette opens",
+            entry.name
+        );
+        harness.get_by_label("What do you want to do?");
+        harness.event(eframe::egui::Event::Text(entry.name.to_owned()));
+        harness.run_steps(2);
+        harness.key_press(Key::Enter);
+        harness.run_steps(3);
+        if entry.action != Action::Palette {
+            assert!(harness.query_by_label("What do you want to do?").is_none(), "{}: it closes", entry.name);
+        }
+        let after = harness.state().is_on(entry.action);
+        let stays =
+            matches!(entry.action, Action::SideBySide | Action::NoTool | Action::Backend(_) | Action::Watch);
+        assert!(stays || before.is_none() || before != after, "{} switches something", entry.name);
+        // What was opened is closed again, so that one does not hide the next.
+        for _ in 0..3 {
+            harness.key_press(Key::Escape);
+            harness.run_steps(1);
+        }
+        if harness.state().is_on(Action::Turntable) == Some(true) {
+            harness.key_press(Key::T);
+            harness.run_steps(1);
+        }
+    }
+    rest(&mut harness);
+    assert!(harness.state().picture(0).is_some(), "and all panes still draw");
+}
+
+#[test]
+fn keys_are_those_of_the_table() {
+    let mut harness = window("polyhedra");
+    let eye = harness.state().camera().eye;
+    harness.key_press_modifiers(Modifiers::SHIFT, Key::Num5);
+    rest(&mut harness);
+    assert!(harness.state().camera().forward().y < -0.999, "from above");
+    press(&mut harness, Key::Home);
+    assert_eq!(harness.state().camera().eye, eye, "the scene's own camera");
+    press(&mut harness, Key::P);
+    assert_eq!(harness.state().is_on(Action::Parallel), Some(true));
+    press(&mut harness, Key::Plus);
+    assert_eq!(harness.state().shown().count(), 3);
+    press(&mut harness, Key::Minus);
+    press(&mut harness, Key::Minus);
+    assert_eq!(harness.state().shown().count(), 1);
+    harness.key_press_modifiers(Modifiers::SHIFT, Key::G);
+    rest(&mut harness);
+    assert_eq!(harness.state().mode(), Mode::ErrorMaps);
+    // Letters that are written are no keys.
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    harness.run_steps(3);
+    harness.key_press(Key::X);
+    harness.run_steps(3);
+    assert_eq!(harness.state().mode(), Mode::ErrorMaps);
+}
+
+#[test]
+fn the_first_screen_says_how_and_goes() {
+    let mut harness = window("polyhedra");
+    press(&mut harness, Key::F1);
+    assert!(harness.query_by_label_contains("Drop a model onto this window").is_some());
+    harness.get_by_label("Begin").click();
+    rest(&mut harness);
+    assert!(harness.query_by_label_contains("Drop a model onto this window").is_none());
+}

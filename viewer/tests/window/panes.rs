@@ -1,0 +1,148 @@
+//! Do panes show what they are asked for, in every mode?
+
+use crate::harness::{colors, drag, press, rest, window};
+use eframe::egui::accesskit::Role;
+use eframe::egui::{Key, Pos2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use polyptych::BuiltinBackends;
+use polyptych::seam::Registry;
+use polyptych_viewer::{Mode, Viewer};
+
+#[test]
+fn two_back_ends_stand_side_by_side_at_once() {
+    let harness = window("polyhedra");
+    assert_eq!(harness.state().shown().collect::<Vec<_>>(), ["raster", "reference"]);
+    assert!(colors(&harness, 0) > 50 && colors(&harness, 1) > 50);
+    let (a, b) = (harness.state().picture(0).unwrap(), harness.state().picture(1).unwrap());
+    assert_eq!(a.1, b.1, "panes of one size");
+    let differ =
+        a.0.iter().zip(&b.0).filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 8)).count();
+    assert!(differ * 50 < a.0.len(), "the same scene from the same side: {differ} of {}", a.0.len());
+}
+
+#[test]
+fn switching_keeps_camera_and_settings() {
+    let mut harness = window("polyhedra");
+    drag(&mut harness, Pos2::new(160.0, 200.0), Pos2::new(200.0, 210.0));
+    let camera = harness.state().camera().clone();
+    let ids: Vec<_> = Registry::builtin().ids().map(str::to_owned).collect();
+    for (digit, id) in [Key::Num1, Key::Num3, Key::Num5, Key::Num2].into_iter().zip([0, 2, 4, 1]) {
+        press(&mut harness, digit);
+        assert_eq!(harness.state().shown().next(), Some(ids[id].as_str()));
+        assert_eq!(harness.state().camera().eye, camera.eye);
+        assert!(colors(&harness, 0) > 20, "{}", ids[id]);
+    }
+    assert_eq!(harness.state().shown().nth(1), Some("reference"), "the other pane is left alone");
+}
+
+#[test]
+fn dragging_turns_the_camera_of_all_panes() {
+    let mut harness = window("polyhedra");
+    let (eye, before) = (harness.state().camera().eye, harness.state().picture(1).unwrap().0.to_vec());
+    drag(&mut harness, Pos2::new(160.0, 200.0), Pos2::new(260.0, 200.0));
+    let turned = harness.state().camera().eye;
+    assert!(turned.distance(eye) > 0.1, "{eye} {turned}");
+    assert_ne!(before, harness.state().picture(1).unwrap().0, "the pane beside it turned, too");
+}
+
+#[test]
+fn a_parameter_changes_the_picture_and_is_kept() {
+    let mut harness = window("polyhedra");
+    drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
+    press(&mut harness, Key::Num3);
+    assert_eq!(harness.state().shown().next(), Some("voxel"));
+    let before = harness.state().picture(0).unwrap().0.to_vec();
+    harness.get_by_label("Settings").click();
+    rest(&mut harness);
+    drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
+    harness.get_by_role(Role::CheckBox).click();
+    rest(&mut harness);
+    let set = |harness: &Harness<'_, Viewer>| harness.state().settings("voxel").iter().count();
+    assert_eq!(set(&harness), 1);
+    assert_ne!(before, harness.state().picture(0).unwrap().0, "no shadows any more");
+    for key in [Key::Num2, Key::Num3] {
+        // Keys act on the pane under the mouse, and panels differ in width.
+        drag(&mut harness, Pos2::new(60.0, 200.0), Pos2::new(60.0, 200.0));
+        press(&mut harness, key);
+    }
+    assert_eq!(harness.state().shown().next(), Some("voxel"));
+    assert_eq!(set(&harness), 1, "what was set is still set");
+}
+
+#[test]
+fn what_differs_between_two_panes_is_mapped() {
+    let mut harness = window("polyhedra");
+    press(&mut harness, Key::G);
+    assert_eq!(harness.state().mode(), Mode::Difference);
+    let bright = |harness: &Harness<'_, Viewer>| {
+        let map = harness.state().difference().expect("a map");
+        assert_eq!(map.len(), harness.state().picture(0).unwrap().0.len());
+        map.iter().filter(|p| p[0] > 60).count()
+    };
+    let edges = bright(&harness);
+    let all = harness.state().picture(0).unwrap().0.len();
+    assert!(edges > 20 && edges < all / 20, "raster and reference differ at edges only: {edges} of {all}");
+    // The first pane becomes the reference, too.
+    drag(&mut harness, Pos2::new(60.0, 200.0), Pos2::new(60.0, 200.0));
+    press(&mut harness, Key::Num1);
+    let same = harness.state().shown().next() == harness.state().shown().nth(1);
+    assert!(same, "{:?}", harness.state().shown().collect::<Vec<_>>());
+    assert_eq!(bright(&harness), 0);
+    press(&mut harness, Key::G);
+    assert_eq!((harness.state().mode(), harness.state().difference()), (Mode::SideBySide, None));
+}
+
+#[test]
+fn panes_are_held_against_the_reference_and_their_values_listed() {
+    let mut harness = window("polyhedra");
+    assert_eq!(harness.state().error(0), None);
+    harness.get_by_label("Errors").click();
+    rest(&mut harness);
+    let error = |harness: &Harness<'_, Viewer>, pane| harness.state().error(pane).expect("an error");
+    assert!(error(&harness, 0).contains(" dB, ids 100.00 %"), "{}", error(&harness, 0));
+    assert!(error(&harness, 1).starts_with("same color, ids 100.00 %"), "{}", error(&harness, 1));
+    let size = |pane| harness.state().picture(pane).unwrap().1;
+    assert_eq!(size(0), size(1), "pictures that are compared have one size");
+    harness.get_by_label("Errors").click();
+    rest(&mut harness);
+    assert_eq!(harness.state().error(0), None);
+    // The middle of the picture shows an object; both back ends say which.
+    press(&mut harness, Key::V);
+    drag(&mut harness, Pos2::new(160.0, 180.0), Pos2::new(160.0, 180.0));
+    rest(&mut harness);
+    let labels: Vec<_> = harness.query_all_by_label_contains("id ").map(|n| n.value()).collect();
+    assert_eq!(labels.len(), 2, "{labels:?}");
+    assert!(harness.query_all_by_label_contains("distance ").count() == 2);
+}
+
+#[test]
+fn space_flips_between_two_panes() {
+    let mut harness = window("polyhedra");
+    press(&mut harness, Key::Z);
+    assert_eq!(harness.state().mode(), Mode::Flip);
+    assert!(harness.query_by_label_contains("hold space").is_none(), "it is painted, not a widget");
+    harness.key_down(Key::Space);
+    harness.run_steps(2);
+    press(&mut harness, Key::Num3);
+    assert_eq!(harness.state().shown().collect::<Vec<_>>(), ["raster", "voxel"], "keys act on the pane seen");
+    harness.key_up(Key::Space);
+    harness.run_steps(2);
+    press(&mut harness, Key::Num4);
+    assert_eq!(harness.state().shown().collect::<Vec<_>>(), ["freeform", "voxel"]);
+}
+
+#[test]
+fn modes_and_panes_follow_the_bar() {
+    let mut harness = window("polyhedra");
+    harness.get_by_label("Wipe").click();
+    rest(&mut harness);
+    assert_eq!(harness.state().mode(), Mode::Wipe);
+    assert!(harness.state().picture(0).unwrap().1[0] > 600, "both have the whole width");
+    press(&mut harness, Key::X);
+    assert_eq!(harness.state().mode(), Mode::SideBySide);
+    harness.get_by_label("4").click();
+    rest(&mut harness);
+    assert_eq!(harness.state().shown().count(), 4);
+    assert!((0..4).all(|pane| colors(&harness, pane) > 20));
+}
