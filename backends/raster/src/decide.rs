@@ -1,6 +1,6 @@
 //! How is each object drawn, and what is lost?
 
-use crate::info::{Mode, Options, Shading};
+use crate::info::{Mode, Options, Shading, Tier};
 use crate::light::Lamp;
 use crate::shadow::MapSizes;
 use polyptych_core::camera::Projection;
@@ -79,6 +79,9 @@ fn light_losses(lamps: &[Lamp], options: Options, sizes: MapSizes) -> Option<&'s
     let casting = |lamp: &&Lamp| lamp.light.casts_shadow;
     if options.mode != Mode::Shadowed {
         return lamps.iter().find(casting).map(|_| "shadows are switched off");
+    }
+    if lamps.iter().filter(casting).any(|lamp| lamp.tier == Tier::Plain) {
+        return Some("shadows begin a texel late and have soft edges of a texel's width");
     }
     let local = lamps.iter().filter(casting).any(|l| !matches!(l.light.kind, LightKind::Directional { .. }));
     (local && sizes.local.is_none())

@@ -9,6 +9,8 @@ use polyptych_core::seam::{BackendInfo, Need, Parameter, ParameterKind, Value};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Options {
     pub(crate) map_size: u32,
+    /// Nothing for what suits texels and pixels.
+    pub(crate) tier: Option<Tier>,
     pub(crate) samples: u32,
     pub(crate) mode: Mode,
     pub(crate) shading: Shading,
@@ -30,6 +32,17 @@ pub(crate) enum Mode {
     Wireframe,
 }
 
+/// How shadows are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tier {
+    /// By depths in a map; see [`plain`](crate::plain).
+    Plain,
+    /// By triangles that a map names; see [`lookup`](crate::lookup).
+    Id,
+    /// By all triangles on the way to the light; see [`exact`](crate::exact).
+    Exact,
+}
+
 /// Where on a triangle light is reckoned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shading {
@@ -47,6 +60,8 @@ const MODES: [(&str, Mode); 4] = [
     ("hidden-line", Mode::HiddenLine),
     ("wireframe", Mode::Wireframe),
 ];
+const TIERS: [(&str, Option<Tier>); 4] =
+    [("id", Some(Tier::Id)), ("plain", Some(Tier::Plain)), ("exact", Some(Tier::Exact)), ("auto", None)];
 const SHADINGS: [(&str, Shading); 3] =
     [("phong", Shading::Phong), ("gouraud", Shading::Gouraud), ("flat", Shading::Flat)];
 const LIGHTINGS: [(&str, Option<LightingModel>); 4] = [
@@ -68,6 +83,7 @@ impl Options {
         let (settings, declared) = (&need.settings, &info.parameters);
         Self {
             map_size: settings.int(declared, "shadow.map_size").clamp(256, 8192) as u32,
+            tier: named(&TIERS, settings.text(declared, "shadow.tier")),
             samples: need.samples.max(settings.int(declared, "samples") as u32).clamp(1, smooth::MOST),
             mode: named(&MODES, settings.text(declared, "mode")),
             shading: named(&SHADINGS, settings.text(declared, "shading")),
@@ -122,6 +138,12 @@ pub(crate) fn info() -> BackendInfo {
                 tag: "samples",
                 quality_axis: true,
             },
+            choice(
+                "shadow.tier",
+                &["id", "plain", "exact", "auto"],
+                "How shadows are found: by triangles that a map names, by depths in a map with soft edges of a texel, by \
+                 all triangles on the way, or exactly where texels are larger than pixels",
+            ),
             choice(
                 "mode",
                 &["shadowed", "lit", "hidden-line", "wireframe"],

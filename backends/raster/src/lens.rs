@@ -246,6 +246,21 @@ impl Lens {
         }
     }
 
+    /// Returns how far ahead a point relative to the origin is.
+    pub(crate) fn ahead_of(&self, p: DVec3) -> f64 {
+        self.ahead.at(p)
+    }
+
+    /// Returns how wide a pixel is at a point relative to the origin.
+    pub(crate) fn meters_of_pixel(&self, p: DVec3) -> f64 {
+        let [right, down] = self.steps().map(DVec3::length);
+        let wide = right.max(down);
+        match self.rays {
+            Rays::Central => wide * self.ahead.at(p),
+            Rays::Parallel => wide,
+        }
+    }
+
     /// Returns by what rays differ over one pixel to the right and one down: central ones by their direction,
     /// parallel ones by their start.
     pub(crate) fn steps(&self) -> [DVec3; 2] {

@@ -18,7 +18,9 @@
 //!  color      textures and colors of corners
 //!  batch      eight visible pixels at once: distances, places, unit normals
 //!  light      the lighting equation of the core over a batch, with shadows
-//!  lookup     what stands between eight points and a light
+//!  lookup     what stands between eight points and a light, by triangles that a map names
+//!  plain      the same by depths in a map
+//!  exact      the same by all triangles on the way
 //!  smooth     edges: triangles that share a pixel, by several places in it
 //!  paint      the steps of a tile, and the pixel's channels
 //!  lines      edges of faces, and free segments                   (prepare, for modes that draw them)
@@ -47,6 +49,7 @@ mod conversion;
 mod crossings;
 mod decide;
 mod drawing;
+mod exact;
 mod face;
 mod faces;
 mod frame;
@@ -60,6 +63,7 @@ mod lookup;
 mod model;
 mod octet;
 mod paint;
+mod plain;
 mod plan;
 mod ready;
 mod renderer;

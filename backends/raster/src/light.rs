@@ -2,6 +2,7 @@
 
 use crate::batch::Batch;
 use crate::gouraud::Gouraud;
+use crate::info::Tier;
 use crate::lookup::Sights;
 use crate::model::Model;
 use crate::shadow::Shadows;
@@ -20,6 +21,8 @@ pub(crate) struct Lamp {
     pub(crate) cell: Option<Cell>,
     /// Whether anything can stand between it and a surface, so that its shadows must be found.
     pub(crate) is_blocked: bool,
+    /// How they are found.
+    pub(crate) tier: Tier,
 }
 
 /// The place of an emissive voxel: its own faces do not block its light.
@@ -50,6 +53,7 @@ impl Lamp {
             },
             cell: if i < own { None } else { cells.next() },
             is_blocked: light.casts_shadow,
+            tier: Tier::Id,
             light,
         };
         lights.into_iter().enumerate().map(lamp).collect()
@@ -114,20 +118,22 @@ impl Illumination<'_> {
             let counts = if wants.shadow && casts { Mask8::ALL } else { is_not_black(added) };
             let mut arrives = comes & faces_light & counts;
             let crosses = if casts { arrives & taking } else { Mask8::NONE };
+            let mut share = one;
             if let Some(shadows) = self.shadows.filter(|_| crosses.any()) {
-                let looks = shadows.look(index, batch.place, origin, crosses);
                 let sights = Sights {
                     place: batch.place + DVec3x8::splat(origin - shadows.origin),
                     triangle: batch.names.id,
                     to_light: arrivals.to_light,
                     distance: arrivals.distance,
                 };
-                arrives = arrives & !shadows.blocked((self.scene, self.model), &looks, &sights, crosses);
+                let of = (self.scene, self.model);
+                share = crosses.pick(shadows.shares(index, of, &sights, &batch.true_normal, crosses), one);
+                arrives = arrives & share.above(F32x8::ZERO);
             }
-            batch.lit = Vec3x8::pick(arrives, batch.lit + added, batch.lit);
+            batch.lit = Vec3x8::pick(arrives, batch.lit + added.scaled(share), batch.lit);
             if casts {
                 casting = comes.pick(casting + one, casting);
-                reaching = arrives.pick(reaching + one, reaching);
+                reaching = arrives.pick(reaching + share, reaching);
             }
         }
         let counts = taking & casting.above(F32x8::ZERO);

@@ -43,21 +43,33 @@ pub(crate) struct Looks<'a> {
 }
 
 /// A triangle as seen from a point.
-struct Blocker {
+pub(crate) struct Blocker {
     /// Relative to the point.
-    corners: [DVec3; 3],
+    pub(crate) corners: [DVec3; 3],
     /// Not of unit length.
-    normal: DVec3,
+    pub(crate) normal: DVec3,
     /// `normal . p` of the points of its plane.
-    offset: f64,
+    pub(crate) offset: f64,
 }
 
 /// The way from a point to a light.
-struct Sight {
-    place: DVec3,
-    triangle: u32,
-    to_light: DVec3,
+pub(crate) struct Sight {
+    pub(crate) place: DVec3,
+    pub(crate) triangle: u32,
+    pub(crate) to_light: DVec3,
     distance: f64,
+}
+
+impl Sights {
+    #[inline(always)]
+    pub(crate) fn of(&self, lane: usize) -> Sight {
+        Sight {
+            place: self.place.get(lane),
+            triangle: self.triangle[lane],
+            to_light: self.to_light.get(lane),
+            distance: self.distance.0[lane],
+        }
+    }
 }
 
 impl<'a> Looks<'a> {
@@ -79,7 +91,7 @@ impl<'a> Looks<'a> {
 
 impl Blocker {
     #[inline(always)]
-    fn of(shadows: &Shadows, id: u32, place: DVec3) -> Self {
+    pub(crate) fn of(shadows: &Shadows, id: u32, place: DVec3) -> Self {
         let [a, b, c] = shadows.blockers[id as usize].0;
         let corners = [a.as_dvec3() - place, b.as_dvec3() - place, c.as_dvec3() - place];
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -88,7 +100,7 @@ impl Blocker {
 
     /// Tells whether a line through the point passes through the triangle.
     #[inline(always)]
-    fn is_crossed(&self, direction: DVec3) -> bool {
+    pub(crate) fn is_crossed(&self, direction: DVec3) -> bool {
         let [a, b, c] = self.corners;
         // Volumes spanned by the line and each edge, of one sign inside (edges belong to both neighbors).
         let u = b.cross(c).dot(direction);
@@ -99,7 +111,7 @@ impl Blocker {
 
     /// Tells whether its plane is between the point and the light.
     #[inline(always)]
-    fn is_before(&self, sight: &Sight, tolerance: f64) -> bool {
+    pub(crate) fn is_before(&self, sight: &Sight, tolerance: f64) -> bool {
         let (gap, slope) = (self.offset, self.normal.dot(sight.to_light));
         gap * slope > 0.0
             && gap.abs() < slope.abs() * sight.distance
@@ -108,13 +120,11 @@ impl Blocker {
 }
 
 impl Shadows {
-    /// Looks points up in the map of a light. `origin` is what the places are relative to.
+    /// Looks points, relative to the origin of the shadows, up in the maps of a light.
     #[inline(always)]
-    pub(crate) fn look(&self, lamp: usize, places: DVec3x8, origin: DVec3, wanted: Mask8) -> Looks<'_> {
+    pub(crate) fn look<'f>(&self, faces: &'f [MapFace], places: DVec3x8, wanted: Mask8) -> Looks<'f> {
         let mut looks = Looks::none();
-        let faces = &self.maps[lamp].faces[..];
         let Some(first) = faces.first() else { return looks };
-        let places = places + DVec3x8::splat(origin - self.origin);
         let [x, y, ahead] = first.lens.places(places - DVec3x8::splat(first.lens.origin));
         for i in (0..LANES).filter(|&i| wanted.has(i)) {
             if faces.len() == 1 {
@@ -143,12 +153,8 @@ impl Shadows {
         for i in 0..LANES {
             let triangle = sights.triangle[i];
             let any = looks.ids[i].iter().any(|&id| (id != NO_TRIANGLE) & (id != triangle));
-            if wanted.has(i) && any {
-                let (place, to_light) = (sights.place.get(i), sights.to_light.get(i));
-                let sight = Sight { place, triangle, to_light, distance: sights.distance.0[i] };
-                if self.is_blocked(scene, model, looks, i, &sight) {
-                    blocked.0[i] = u32::MAX;
-                }
+            if wanted.has(i) && any && self.is_blocked(scene, model, looks, i, &sights.of(i)) {
+                blocked.0[i] = u32::MAX;
             }
         }
         blocked
@@ -191,7 +197,7 @@ impl Shadows {
 
     /// Tells whether a triangle is no hole where the way to the light crosses it.
     #[inline(always)]
-    fn is_solid(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
+    pub(crate) fn is_solid(&self, scene: &Scene, model: &Model, id: u32, sight: &Sight) -> bool {
         !self.any_holes || self.is_no_hole(scene, model, id, sight)
     }
 
@@ -211,7 +217,7 @@ impl Shadows {
 impl MapFace {
     /// Returns the triangles at a texel, its right neighbor, and the two below.
     #[inline(always)]
-    fn square(&self, column: i32, row: i32) -> [u32; 4] {
+    pub(crate) fn square(&self, column: i32, row: i32) -> [u32; 4] {
         let (x, y) = (column as u32, row as u32);
         let (in_tile_x, in_tile_y) = (x % TILE_WIDTH, y % TILE_HEIGHT);
         let in_one_tile = in_tile_x + 1 < TILE_WIDTH && in_tile_y + 1 < TILE_HEIGHT;

@@ -40,8 +40,9 @@ struct Amount {
 }
 
 pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
-    let lamps = Lamp::all(scene);
+    let mut lamps = Lamp::all(scene);
     let sizes = MapSizes::new(options.map_size, &lamps);
+    sizes.choose_tiers(&mut lamps, options.tier, scene, need);
     let demand = demand(scene, need, &lamps, options);
     let of_all = losses_of_all(scene, &lamps, options, sizes);
     let bends = is_resampled(&need.camera.projection);
@@ -74,7 +75,7 @@ pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
     let mut of_blockers = 0;
     for (index, (lamp, shadow)) in lamps.iter().zip(&demand.shadows).enumerate() {
         if shadow.is_ok() {
-            let (map, of_triangle) = Shadows::planned_bytes(&lamp.light.kind, sizes);
+            let (map, of_triangle) = Shadows::planned_bytes(lamp, sizes, amount.triangles as u64);
             bytes += map;
             of_blockers = of_triangle * amount.triangles as u64;
         }

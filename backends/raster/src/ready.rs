@@ -98,6 +98,7 @@ impl Ready {
                 && a.light == b.light
                 && a.cell == b.cell
                 && a.is_blocked == b.is_blocked
+                && a.tier == b.tier
         };
         let same_maps: Vec<bool> = self.lamps.iter().zip(&other.lamps).map(same_map).collect();
         if self.lamps.len() == other.lamps.len() && same_parts && same_maps.iter().all(|same| *same) {

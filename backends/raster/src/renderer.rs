@@ -198,6 +198,7 @@ impl Renderer for Raster {
         }
         let asked = need.channels.has(Channel::Color) || need.channels.has(Channel::Shadow);
         let sizes = MapSizes::new(options.map_size, &lamps);
+        sizes.choose_tiers(&mut lamps, options.tier, scene, need);
         let mut decisions = given.to_vec();
         for loss in decide::losses_of_all(scene, &lamps, options, sizes) {
             decisions.iter_mut().for_each(|d| *d = decide::with_loss(d, loss));

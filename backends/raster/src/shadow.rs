@@ -6,17 +6,22 @@
 
 use crate::bin::{Bins, Pass, Without};
 use crate::casters::Casters;
+use crate::exact::{Cells, edge_for};
 use crate::face::{Face, Place};
+use crate::info::Tier;
 use crate::lens::{Lens, Rays, cube_axes};
 use crate::light::Lamp;
+use crate::lookup::Sights;
 use crate::model::{Model, Part, Role};
 use crate::tile::{NO_TRIANGLE, TILE_PIXELS, TileBuffer, TileGrid};
 use crate::transform::{ScreenVertices, transform};
 use glam::{DMat3, DVec3, Vec3};
+use polyptych_core::camera::{Camera, Projection};
+use polyptych_core::lanes::{DVec3x8, F32x8, Mask8};
 use polyptych_core::math::{Aabb, orthonormal_basis};
 use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{LightKind, Scene};
-use polyptych_core::seam::{Cancelled, Control};
+use polyptych_core::seam::{Cancelled, Control, Need};
 
 /// Most texels of all maps of point and spot lights together: 128 MiB.
 const MOST_TEXELS: u64 = 32 << 20;
@@ -45,6 +50,9 @@ pub(crate) struct Shadows {
 #[derive(Default)]
 pub(crate) struct Map {
     pub(crate) faces: Vec<MapFace>,
+    /// Instead of faces, where shadows are found exactly.
+    cells: Vec<Cells>,
+    is_plain: bool,
 }
 
 pub(crate) struct MapFace {
@@ -74,6 +82,39 @@ impl MapSizes {
         let edge = fair.min(map_size / 2).max(LEAST_EDGE.min(map_size));
         let fits = u64::from(edge) * u64::from(edge) * faces <= MOST_TEXELS;
         Self { directional: map_size, local: fits.then_some(edge) }
+    }
+
+    /// Returns the sizes of pictures whose tiles serve as cells.
+    fn for_cells(self, triangles: u32) -> Self {
+        let edge = edge_for(triangles);
+        Self { directional: edge, local: self.local.map(|_| edge / 2) }
+    }
+
+    /// Chooses how shadows are found: as asked, or so that no edge of one is coarser than the pixels of a picture.
+    pub(crate) fn choose_tiers(self, lamps: &mut [Lamp], asked: Option<Tier>, scene: &Scene, need: &Need) {
+        let bounds = if asked.is_none() { scene.bounds() } else { Aabb::EMPTY };
+        for lamp in lamps {
+            let suited = || self.tier_for(&lamp.light.kind, &bounds, &need.camera, need.height);
+            lamp.tier = asked.unwrap_or_else(suited);
+        }
+    }
+
+    /// Compares the sizes of texels and pixels in the middle of what is seen.
+    fn tier_for(self, kind: &LightKind, bounds: &Aabb, camera: &Camera, height: u32) -> Tier {
+        let center = bounds.center();
+        let pixel = match camera.projection {
+            Projection::Orthographic { height: meters } => meters / f64::from(height.max(1)),
+            Projection::Perspective { fov_y } => {
+                let away = center.distance(camera.eye).max(bounds.radius());
+                2.0 * (fov_y * 0.5).tan() * away / f64::from(height.max(1))
+            }
+            // Bent pictures are looked up in faces whose pixels are finer.
+            Projection::Fisheye { .. } | Projection::Cylindrical { .. } | Projection::Warp(_) => 0.0,
+        };
+        let around = Aabb::new(bounds.min - center, bounds.max - center);
+        let lens = lenses(kind, self, &around, center).into_iter().next();
+        let texel = lens.map_or(0.0, |lens| lens.meters_of_pixel(-lens.origin).abs());
+        if texel > pixel { Tier::Exact } else { Tier::Id }
     }
 }
 
@@ -134,19 +175,27 @@ impl Shadows {
                 shadows.maps.push(map);
                 continue;
             }
-            let mut map = Map::default();
+            let mut map = Map { is_plain: lamp.tier == Tier::Plain, ..Map::default() };
             let (bounds, left_out) = casters.of_light(model, &lamp.light.kind, lamp.cell);
             if lamp.is_blocked && !bounds.is_empty() {
                 let bounds = Aabb::new(bounds.min - origin, bounds.max - origin);
+                let exact = lamp.tier == Tier::Exact;
+                let sizes = if exact { sizes.for_cells(model.triangles) } else { sizes };
                 for mut lens in lenses(&lamp.light.kind, sizes, &bounds, origin) {
                     control.check()?;
                     lens.origin += origin;
                     let role = Role::Light;
                     let (culls_back, without) = (false, Some(&left_out as &dyn Without));
-                    let pass = Pass { model, lens: &lens, role, culls_back, smooth: false, without };
+                    // A cell lists all that touches it; a map shows what its texels' centers show.
+                    let pass = Pass { model, lens: &lens, role, culls_back, smooth: exact, without };
                     transform(model, &lens, vertices, control.threads);
-                    let grid = TileGrid::new(lens.width, lens.height);
+                    let grid = TileGrid::new(lens.width, lens.height).smooth(exact);
                     bins.fill(&pass, vertices, &grid, control.threads);
+                    if exact {
+                        lens.origin -= origin;
+                        map.cells.push(Cells::of(lens, grid, bins));
+                        continue;
+                    }
                     let mut tiles: Vec<[u32; TILE_PIXELS]> = spare.pop().unwrap_or_default();
                     tiles.resize(grid.count(), [NO_TRIANGLE; TILE_PIXELS]);
                     draw(scene, &pass, bins, &grid, &mut tiles, control.threads);
@@ -159,12 +208,40 @@ impl Shadows {
         Ok(shadows)
     }
 
-    /// Returns the bytes of the map of a light, and those of a triangle that may block.
-    pub(crate) fn planned_bytes(kind: &LightKind, sizes: MapSizes) -> (u64, u64) {
-        let square = |edge: u32| (TileGrid::new(edge, edge).count() * TILE_PIXELS * 4) as u64;
-        let map = match kind {
+    /// Returns which share of a light arrives at each of the wanted points; `normal` are their true normals.
+    #[inline(always)]
+    pub(crate) fn shares(
+        &self,
+        lamp: usize,
+        of: (&Scene, &Model),
+        sights: &Sights,
+        normal: &DVec3x8,
+        wanted: Mask8,
+    ) -> F32x8 {
+        let map = &self.maps[lamp];
+        if map.is_plain {
+            return self.shares_of_depths(&map.faces, sights, normal, wanted);
+        }
+        let blocked = if map.cells.is_empty() {
+            let looks = self.look(&map.faces, sights.place, wanted);
+            self.blocked(of, &looks, sights, wanted)
+        } else {
+            self.blocked_exactly(of, &map.cells, sights, wanted)
+        };
+        blocked.pick(F32x8::ZERO, F32x8::splat(1.0))
+    }
+
+    /// Returns the bytes of the maps or cells of a light, and those of a triangle that may block.
+    pub(crate) fn planned_bytes(lamp: &Lamp, sizes: MapSizes, triangles: u64) -> (u64, u64) {
+        let exact = lamp.tier == Tier::Exact;
+        let sizes = if exact { sizes.for_cells(u32::try_from(triangles).unwrap_or(u32::MAX)) } else { sizes };
+        let square = |edge: u32| {
+            let cells = TileGrid::new(edge, edge).count() as u64;
+            if exact { Cells::planned_bytes(cells, triangles) } else { cells * TILE_PIXELS as u64 * 4 }
+        };
+        let map = match &lamp.light.kind {
             LightKind::Directional { .. } => square(sizes.directional),
-            LightKind::Point { .. } | LightKind::Spot { .. } => {
+            kind @ (LightKind::Point { .. } | LightKind::Spot { .. }) => {
                 sizes.local.map_or(0, |edge| faces_of(kind) * square(edge))
             }
         };
@@ -180,7 +257,8 @@ impl Shadows {
     /// Returns the bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let tiles: usize = self.maps.iter().flat_map(|m| &m.faces).map(|f| f.tiles.len()).sum();
-        (tiles * TILE_PIXELS * 4 + self.blockers.len() * size_of::<Blocker>()) as u64
+        let cells: u64 = self.maps.iter().flat_map(|m| &m.cells).map(Cells::bytes).sum();
+        (tiles * TILE_PIXELS * 4 + self.blockers.len() * size_of::<Blocker>()) as u64 + cells
     }
 }
 

@@ -1,6 +1,6 @@
 //! Is what a light sees lit, and nothing else?
 
-use super::{Random, camera, cube, draw, plane, scene_of};
+use super::{Random, camera, cube, draw, draw_with, plane, scene_of};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::framebuffer::Framebuffer;
@@ -42,19 +42,22 @@ fn a_plane_does_not_shadow_itself_at_any_slope() {
             let azimuth = DVec3::new(0.5_f64.cos(), 0.0, 0.5_f64.sin());
             let to_light = turned * (azimuth * s.sin() + DVec3::Y * s.cos());
             scene.lights = vec![Light::directional(-to_light), Light::point(place + to_light * 30.0, 100.0)];
-            let picture = draw(&scene, camera([1.0, 4.0, 3.0], [0.0; 3]), 150, 100);
-            let count = scene.objects[0].shape.bytes();
-            assert_eq!(share_in_shadow(&picture), 0.0, "slope {slope} of {count} bytes");
+            for tier in ["id", "exact", "plain"] {
+                let settings = [("shadow.tier", tier)];
+                let picture = draw_with(&scene, camera([1.0, 4.0, 3.0], [0.0; 3]), 150, 100, &settings);
+                let count = scene.objects[0].shape.bytes();
+                assert_eq!(share_in_shadow(&picture), 0.0, "{tier}: slope {slope} of {count} bytes");
+            }
         }
     }
 }
 
 /// Compares the shadow of a box on a floor with rays against the box; returns (wrong pixels, floor pixels).
-fn wrong_on_floor(light: &Light, camera: &Camera, offset: DVec3) -> (usize, usize) {
+fn wrong_on_floor(light: &Light, camera: &Camera, offset: DVec3, tier: &str) -> (usize, usize) {
     let mut scene = scene_of(vec![(plane(12.0), [0.0, 0.0, 0.0]), (cube(1.0), [0.0, 0.5, 0.0])]);
     scene.objects.iter_mut().for_each(|o| o.world_from_object.translation += offset);
     scene.lights = vec![light.clone()];
-    let picture = draw(&scene, camera.clone(), 240, 160);
+    let picture = draw_with(&scene, camera.clone(), 240, 160, &[("shadow.tier", tier)]);
     let bounds = Aabb::new(DVec3::new(-0.5, 0.0, -0.5) + offset, DVec3::new(0.5, 1.0, 0.5) + offset);
     let view = camera.view(240, 160);
     let (mut wrong, mut seen) = (0, 0);
@@ -75,15 +78,16 @@ fn wrong_on_floor(light: &Light, camera: &Camera, offset: DVec3) -> (usize, usiz
 #[test]
 fn the_shadow_of_a_box_begins_at_the_box() {
     let camera = camera([2.5, 2.0, 3.0], [0.3, 0.2, 0.2]);
-    for direction in [[-0.5, -1.0, -0.3], [0.7, -0.2, 0.4], [-1.0, -1.0, 0.0], [0.3, -0.05, 1.0]] {
-        let light = Light::directional(DVec3::from_array(direction));
-        let (wrong, seen) = wrong_on_floor(&light, &camera, DVec3::ZERO);
-        assert!(seen > 10_000 && wrong == 0, "{wrong} of {seen} for {direction:?}");
-    }
-    for place in [[2.0, 3.0, 1.0], [-0.2, 1.6, 0.9], [4.0, 0.4, -2.0]] {
-        let (wrong, seen) =
-            wrong_on_floor(&Light::point(DVec3::from_array(place), 9.0), &camera, DVec3::ZERO);
-        assert!(seen > 10_000 && wrong == 0, "{wrong} of {seen} for a light at {place:?}");
+    let directions = [[-0.5, -1.0, -0.3], [0.7, -0.2, 0.4], [-1.0, -1.0, 0.0], [0.3, -0.05, 1.0]];
+    let places = [[2.0, 3.0, 1.0], [-0.2, 1.6, 0.9], [4.0, 0.4, -2.0]];
+    let suns = directions.map(|direction| Light::directional(DVec3::from_array(direction)));
+    let lamps = places.map(|place| Light::point(DVec3::from_array(place), 9.0));
+    for light in suns.iter().chain(&lamps) {
+        for (tier, most) in [("id", 0.0), ("exact", 0.0), ("plain", 0.01)] {
+            let (wrong, seen) = wrong_on_floor(light, &camera, DVec3::ZERO, tier);
+            let share = wrong as f64 / seen as f64;
+            assert!(seen > 10_000 && share <= most, "{tier}: {wrong} of {seen} for {:?}", light.kind);
+        }
     }
 }
 
@@ -92,8 +96,11 @@ fn far_from_the_origin_shadows_are_as_good() {
     let offset = DVec3::new(3e5, -2e5, 1e5);
     let mut camera = camera([2.5, 2.0, 3.0], [0.3, 0.2, 0.2]);
     camera.eye += offset;
-    let (wrong, seen) = wrong_on_floor(&Light::directional(DVec3::new(-0.5, -1.0, -0.3)), &camera, offset);
-    assert!(seen > 10_000 && wrong == 0, "{wrong} of {seen}");
+    for tier in ["id", "exact"] {
+        let sun = Light::directional(DVec3::new(-0.5, -1.0, -0.3));
+        let (wrong, seen) = wrong_on_floor(&sun, &camera, offset, tier);
+        assert!(seen > 10_000 && wrong == 0, "{tier}: {wrong} of {seen}");
+    }
 }
 
 fn ball_under(light: Light, radius: f64) -> Scene {
@@ -197,4 +204,76 @@ fn tetrahedron() -> Shape {
         triangles: vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]],
         ..Mesh::default()
     })
+}
+
+#[test]
+fn exact_shadows_of_crumbs_are_those_of_rays() {
+    // Far smaller than a texel, in front of a wall: each point of it is held against every crumb.
+    let (mut mesh, mut random) = (Mesh::default(), Random(8));
+    for i in 0..3000 {
+        let mut around = |size: f64| (random.next() - 0.5) * size;
+        let at = DVec3::new(around(2.0), around(2.0), 1.0 + around(1.0));
+        for _ in 0..3 {
+            let corner = at + DVec3::new(around(0.09), around(0.09), around(0.09));
+            mesh.positions.push(corner.as_vec3());
+        }
+        mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let corners: Vec<[DVec3; 3]> =
+        mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize].as_dvec3())).collect();
+    let wall = Shape::Primitive(Primitive::Box { size: DVec3::new(3.0, 3.0, 0.5) });
+    let mut scene = scene_of(vec![(wall, [0.0, 0.0, -0.25]), (Shape::Mesh(mesh), [0.0; 3])]);
+    let camera = camera([3.5, 0.5, 2.5], [0.0; 3]);
+    let view = camera.view(120, 90);
+    for light in
+        [Light::directional(DVec3::new(0.1, -0.2, -1.0)), Light::point(DVec3::new(0.3, 0.2, 4.0), 9.0)]
+    {
+        scene.lights = vec![light.clone()];
+        let wrong = |tier: &str| {
+            let settings = [("shadow.tier", tier), ("shadow.map_size", "256")];
+            let picture = draw_with(&scene, camera.clone(), 120, 90, &settings);
+            let (mut wrong, mut dark) = (0, 0);
+            for (i, (&id, &shadow)) in picture.id().iter().zip(picture.shadow()).enumerate() {
+                if id != 1 {
+                    continue;
+                }
+                let ray = view.ray((i % 120) as f64 + 0.5, (i / 120) as f64 + 0.5).unwrap();
+                let point = ray.at(-ray.origin.z / ray.direction.z);
+                if point.x.abs() >= 1.5 || point.y.abs() >= 1.5 {
+                    continue;
+                }
+                let to_light = light.arriving(point).unwrap().to_light;
+                let is_crossed = |[a, b, c]: &[DVec3; 3]| {
+                    let [a, b, c] = [*a - point, *b - point, *c - point];
+                    let sides = [b.cross(c), c.cross(a), a.cross(b)].map(|n| n.dot(to_light) >= 0.0);
+                    sides == [true; 3] || sides == [false; 3]
+                };
+                let blocked = corners.iter().any(is_crossed);
+                wrong += usize::from(blocked != (shadow < 0.5));
+                dark += usize::from(blocked);
+            }
+            assert!(dark > 500, "{dark} dark pixels");
+            wrong
+        };
+        assert_eq!(wrong("exact"), 0);
+        assert!(wrong("id") > 0, "a map has too few texels for them");
+    }
+}
+
+#[test]
+fn shadows_are_exact_where_texels_would_be_larger_than_pixels() {
+    let mut scene = scene_of(vec![(plane(6.0), [0.0; 3]), (cube(1.0), [0.0, 0.9, 0.0])]);
+    for light in
+        [Light::directional(DVec3::new(-0.5, -1.0, -0.3)), Light::point(DVec3::new(1.0, 3.0, 2.0), 9.0)]
+    {
+        scene.lights = vec![light];
+        for (height, suited) in [(20, "id"), (500, "exact")] {
+            let picture = |tier: &str| {
+                let settings = [("shadow.tier", tier), ("shadow.map_size", "256")];
+                draw_with(&scene, camera([2.5, 2.0, 3.0], [0.0; 3]), height, height, &settings)
+            };
+            assert!(picture("auto").same_bits(&picture(suited)), "{height} rows");
+            assert!(!picture("exact").same_bits(&picture("plain")));
+        }
+    }
 }
