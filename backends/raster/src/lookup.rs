@@ -18,7 +18,7 @@ use crate::face::{Face, Place};
 use crate::lens::{Lens, cube_face};
 use crate::model::{Class, Model, Role};
 use crate::shadow::{MapFace, Shadows, looking};
-use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_WIDTH};
+use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH};
 use glam::DVec3;
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 use polyptych_core::scene::Scene;
@@ -77,6 +77,42 @@ impl<'a> Looks<'a> {
         Self { face: [None; LANES], texel: [[0; 2]; LANES], ids: [[NO_TRIANGLE; 4]; LANES] }
     }
 
+    /// Looks where eight points fall on columns and rows of a face. Maps are larger than caches: where texels are in
+    /// memory is found for all points first, so that the memory is asked for all of them at once.
+    #[inline(always)]
+    fn look_all(&mut self, face: &'a MapFace, [x, y, ahead]: [F64x8; 3], wanted: Mask8) {
+        let at = F64x8::splat;
+        let (right, bottom) = (f64::from(face.lens.width) + 0.5, f64::from(face.lens.height) + 0.5);
+        let within = |v: F64x8, end: f64| v.at_least(at(-0.5)) & at(end).at_least(v);
+        let sees = wanted & ahead.above(at(0.0)) & within(x, right) & within(y, bottom);
+        // The corners of a square of four texels' centers are around the point.
+        let (column, row) = (x.nearest().0, y.nearest().0);
+        let (width, height) = (face.lens.width as i32, face.lens.height as i32);
+        let (mut square, mut is_whole) = ([0; LANES], [false; LANES]);
+        for i in 0..LANES {
+            let (column, row) = (column[i].wrapping_sub(1), row[i].wrapping_sub(1));
+            self.texel[i] = [column, row];
+            let is_on_map = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1);
+            is_whole[i] = is_on_map & (sees.0[i] != 0) & MapFace::is_in_one_tile(column, row);
+            square[i] = if is_whole[i] { face.place_of(column, row) } else { 0 };
+        }
+        let texels = face.tiles.as_flattened();
+        for i in 0..LANES {
+            let (upper, lower) = (&texels[square[i]..][..2], &texels[square[i] + TILE_WIDTH as usize..][..2]);
+            self.ids[i] = [upper[0], upper[1], lower[0], lower[1]];
+        }
+        for (i, is_whole) in is_whole.into_iter().enumerate() {
+            if !sees.has(i) {
+                self.ids[i] = [NO_TRIANGLE; 4];
+                continue;
+            }
+            self.face[i] = Some(face);
+            if !is_whole {
+                self.ids[i] = face.square(self.texel[i][0], self.texel[i][1]);
+            }
+        }
+    }
+
     /// Looks where a point falls on a column and row of a face, if the light sees them.
     #[inline(always)]
     fn look(&mut self, i: usize, face: &'a MapFace, x: f64, y: f64, ahead: f64) {
@@ -125,16 +161,16 @@ impl Shadows {
     pub(crate) fn look<'f>(&self, faces: &'f [MapFace], places: DVec3x8, wanted: Mask8) -> Looks<'f> {
         let mut looks = Looks::none();
         let Some(first) = faces.first() else { return looks };
-        let [x, y, ahead] = first.lens.places(places - DVec3x8::splat(first.lens.origin));
+        if faces.len() == 1 {
+            let at = first.lens.places(places - DVec3x8::splat(first.lens.origin));
+            looks.look_all(first, at, wanted);
+            return looks;
+        }
         for i in (0..LANES).filter(|&i| wanted.has(i)) {
-            if faces.len() == 1 {
-                looks.look(i, first, x.0[i], y.0[i], ahead.0[i]);
-            } else {
-                let place = places.get(i);
-                let face = &faces[cube_face(place - first.lens.origin)];
-                let (x, y, ahead) = face.lens.place(place - face.lens.origin);
-                looks.look(i, face, x, y, ahead);
-            }
+            let place = places.get(i);
+            let face = &faces[cube_face(place - first.lens.origin)];
+            let (x, y, ahead) = face.lens.place(place - face.lens.origin);
+            looks.look(i, face, x, y, ahead);
         }
         looks
     }
@@ -215,18 +251,24 @@ impl Shadows {
 }
 
 impl MapFace {
+    /// Tells whether a texel, its right neighbor, and the two below are in one tile.
+    #[inline(always)]
+    fn is_in_one_tile(column: i32, row: i32) -> bool {
+        let (last_column, last_row) = (TILE_WIDTH as i32 - 1, TILE_HEIGHT as i32 - 1);
+        (column & last_column < last_column) & (row & last_row < last_row)
+    }
+
+    /// Returns where a texel on the map is among all.
+    #[inline(always)]
+    fn place_of(&self, column: i32, row: i32) -> usize {
+        let (x, y) = (column as u32, row as u32);
+        let tile = y / TILE_HEIGHT * self.grid.columns + x / TILE_WIDTH;
+        tile as usize * TILE_PIXELS + (y % TILE_HEIGHT * TILE_WIDTH + x % TILE_WIDTH) as usize
+    }
+
     /// Returns the triangles at a texel, its right neighbor, and the two below.
     #[inline(always)]
     pub(crate) fn square(&self, column: i32, row: i32) -> [u32; 4] {
-        let (x, y) = (column as u32, row as u32);
-        let (in_tile_x, in_tile_y) = (x % TILE_WIDTH, y % TILE_HEIGHT);
-        let in_one_tile = in_tile_x + 1 < TILE_WIDTH && in_tile_y + 1 < TILE_HEIGHT;
-        if in_one_tile && x + 1 < self.lens.width && y + 1 < self.lens.height {
-            let tile = &self.tiles[(y / TILE_HEIGHT * self.grid.columns + x / TILE_WIDTH) as usize];
-            let i = (in_tile_y * TILE_WIDTH + in_tile_x) as usize;
-            let below = i + TILE_WIDTH as usize;
-            return [tile[i], tile[i + 1], tile[below], tile[below + 1]];
-        }
         [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.triangle(column + dx, row + dy))
     }
 
@@ -234,8 +276,6 @@ impl MapFace {
         if column < 0 || row < 0 || column >= self.lens.width as i32 || row >= self.lens.height as i32 {
             return NO_TRIANGLE;
         }
-        let (column, row) = (column as u32, row as u32);
-        let tile = (row / TILE_HEIGHT) * self.grid.columns + column / TILE_WIDTH;
-        self.tiles[tile as usize][(row % TILE_HEIGHT * TILE_WIDTH + column % TILE_WIDTH) as usize]
+        self.tiles.as_flattened()[self.place_of(column, row)]
     }
 }
