@@ -14,6 +14,7 @@
 //!  bake       maps of strokes                                        (prepare)
 //!  outline    lines of meshes, from their edges
 //!  cracks     lines of everything else, between pixels
+//!  veil       how far one sees in a part of the picture
 //!  ink        lines as shares of pixels
 //!  light      how much a surface faces the light
 //!  tone       two colors, and steps
@@ -45,6 +46,7 @@ mod stroke;
 mod style;
 mod svg;
 mod tone;
+mod veil;
 
 pub use preset::{Preset, STYLES, StyleError};
 pub use renderer::{Factory, Stylized};

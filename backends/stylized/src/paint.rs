@@ -368,11 +368,17 @@ impl Painting<'_> {
             F32x8::ZERO
         };
         let mut color = style.tone.colors(own, cosine, slope);
+        let takes_normal = style.highlight != Highlight::Off || style.hatching.is_some();
+        let normal = if takes_normal {
+            gather(self.visible.normal(), first, count)
+        } else {
+            Vec3x8::splat(Vec3::ZERO)
+        };
         if style.highlight != Highlight::Off {
-            color = self.shine(style, eight, cosine, color);
+            color = self.shine(style, eight, normal, cosine, color);
         }
         if let Some(hatching) = &style.hatching {
-            color = self.hatch(hatching, style, eight, origin, (own, coded, cosine), color);
+            color = self.hatch(hatching, style, eight, origin, (own, coded, normal, cosine), color);
         }
         if style.paper.grain > 0.0 {
             let grain = self.grain.at(eight.x, eight.y);
