@@ -1,7 +1,9 @@
 //! How do highlights and strokes get onto eight pixels?
 
+use crate::eight::{Eight, numbers};
 use crate::hatch::{EDGE, Hatching, Sticks};
-use crate::paint::{Eight, Look, Painting, numbers};
+use crate::look::Look;
+use crate::paint::Painting;
 use crate::style::{Highlight, Style};
 use glam::{Mat3, Vec3};
 use polyptych_core::camera::Projection;

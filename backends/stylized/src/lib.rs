@@ -20,8 +20,11 @@
 //!  tone       two colors, and steps
 //!  hatch      strokes on dark tones
 //!  paper      what is under a drawing
+//!  look       how an object takes paint
+//!  eight      what is at eight pixels
 //!  lay        highlights and strokes on eight pixels
 //!  paint      a row of the picture
+//!  frame      lines and paint, one after the other
 //!  svg        lines as a file of vectors
 //! ```
 //!
@@ -31,11 +34,14 @@
 mod bake;
 mod cracks;
 mod edges;
+mod eight;
+mod frame;
 mod hatch;
 mod info;
 mod ink;
 mod lay;
 mod light;
+mod look;
 mod outline;
 mod paint;
 mod paper;
