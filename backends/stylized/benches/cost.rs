@@ -98,8 +98,8 @@ fn measure(
         }
         add(label, Box::new(stylized), &own)?;
     }
-    // Only what the shader does itself, as its own clock says.
-    let mut above: Vec<Vec<Duration>> = vec![Vec::new(); renderers.len()];
+    // Only what the shader does itself, as its own clock says: lines, and all the rest.
+    let mut above: Vec<[Vec<Duration>; 2]> = vec![[Vec::new(), Vec::new()]; renderers.len()];
     for frame in 0..frames + 2 {
         for (i, (_, renderer, target, times)) in renderers.iter_mut().enumerate() {
             target.touch();
@@ -108,7 +108,9 @@ fn measure(
             let time = begin.elapsed();
             if frame >= 2 {
                 times.push(time);
-                above[i].push(report.phases.iter().filter(|(p, _)| *p != "visibility").map(|(_, t)| t).sum());
+                for (phase, times) in ["contours", "tone"].into_iter().zip(&mut above[i]) {
+                    times.push(report.phases.iter().filter(|(p, _)| *p == phase).map(|(_, t)| t).sum());
+                }
             }
         }
     }
@@ -120,13 +122,13 @@ fn measure(
     let full = median(&renderers[0].3);
     println!("{name}, {width}x{height}, {} threads: raster frame {full:.2} ms", pool_count(&pool));
     for (i, (label, _, _, times)) in renderers.iter().enumerate().skip(1) {
-        let (whole, own) = (median(times), median(&above[i]));
+        let (whole, [lines, paint]) = (median(times), [0, 1].map(|part| median(&above[i][part])));
         if i == 1 {
             println!("  {label:28} {whole:7.2} ms");
         } else {
             println!(
-                "  {label:28} {whole:7.2} ms, above visibility {own:6.2} ms = {:.0} % of the raster frame",
-                own / full * 100.0
+                "  {label:28} {whole:7.2} ms, above visibility {lines:6.2} + {paint:6.2} ms = {:.0} % of the raster frame",
+                (lines + paint) / full * 100.0
             );
         }
     }

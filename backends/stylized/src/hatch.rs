@@ -11,7 +11,7 @@
 
 use crate::bake::{self, Level, MIDDLE, SIGNED_STEPS};
 use glam::Vec3;
-use polyptych_core::lanes::{F32x8, LANES};
+use polyptych_core::lanes::{F32x8, LANES, Mask8};
 use polyptych_core::load::Limits;
 use polyptych_core::load::image::decode;
 use polyptych_core::seam::{Parameter, Settings};
@@ -75,12 +75,11 @@ pub(crate) struct Hatching {
     pub(crate) opacity: f32,
     pub(crate) texture: f32,
     half_width: f32,
-    /// Darkness at which a stroke of each order begins, for both families; the first is for order 0.
-    begins: [[f32; MOST_LEVELS]; 2],
+    /// Darkness at which a stroke of each order begins, for both families, and by what that changes until the next map;
+    /// the first is for order 0.
+    begins: [[[f32; 2]; MOST_LEVELS]; 2],
     /// The least of those of each family.
     earliest: [f32; 2],
-    /// By what that changes until the next map.
-    changes: [[f32; MOST_LEVELS]; 2],
     /// Darkness in which a stroke grows to its width.
     ramp: f32,
     /// Nothing is laid on what is lighter.
@@ -129,7 +128,7 @@ impl Hatching {
             "screen" => Sticks::Screen,
             _ => Sticks::Triplanar,
         };
-        let [begins, changes] = orders(&thresholds, set);
+        let begins = orders(&thresholds, set);
         let (ramp, thickness) = match set {
             Set::Pencil => (0.16, 0.5),
             Set::Ink => (0.1, 0.5),
@@ -150,8 +149,8 @@ impl Hatching {
             texture: float("hatch.texture"),
             half_width: float("hatch.width") * thickness,
             begins,
-            earliest: begins.map(|family| family.into_iter().fold(f32::MAX, f32::min)),
-            changes,
+            earliest: begins
+                .map(|family| family.into_iter().map(|[begin, _]| begin).fold(f32::MAX, f32::min)),
             ramp: 1.0 / ramp.max(0.01),
             lightest: thresholds.iter().fold(f32::MAX, |a, &b| a.min(b))
                 - if set == Set::Images { 0.06 } else { 0.0 },
@@ -164,50 +163,96 @@ impl Hatching {
 
     /// Returns how much of eight pixels strokes cover, at places of the pattern (1 is its period), on so much darkness.
     /// `density` is how many texels of the largest map a pixel is wide.
+    ///
+    /// A kernel of its own: within that which paints rows it would stand there four times, and leave that no room in the
+    /// processor's cache of instructions.
+    pub(crate) fn ink(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8 {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.ink_avx2(u, v, density, darkness) };
+        }
+        self.ink_here(*u, *v, *density, *darkness)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn ink_avx2(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8 {
+        self.ink_here(*u, *v, *density, *darkness)
+    }
+
     #[expect(clippy::needless_range_loop, reason = "several arrays are read and written lane by lane")]
     #[inline(always)]
-    pub(crate) fn ink(&self, u: F32x8, v: F32x8, density: F32x8, darkness: F32x8) -> F32x8 {
-        let last = self.levels.len() as i32 - 1;
-        let repeats_near = self.set != Set::Images;
+    fn ink_here(&self, u: F32x8, v: F32x8, density: F32x8, darkness: F32x8) -> F32x8 {
         // The exponent of the density is the map, its mantissa the way to the next one.
         let bounded = density.max(F32x8::splat(2f32.powi(-20))).min(F32x8::splat(2f32.powi(20)));
-        let (mut index, mut within, mut way, mut beyond) =
-            ([0i32; LANES], F32x8::ZERO, F32x8::ZERO, F32x8::ZERO);
-        let (mut size, mut repeats) = (F32x8::ZERO, F32x8::ZERO);
+        let (mut halvings, mut mantissa) = ([0i32; LANES], F32x8::ZERO);
+        // One operation a loop, here and below: of longer ones the compiler makes no vectors.
         for i in 0..LANES {
-            let bits = bounded.0[i].to_bits();
-            let halvings = (bits >> 23) as i32 - 127;
-            let mantissa = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000);
-            let is_beyond = halvings > last;
-            index[i] = halvings.clamp(0, last);
-            size.0[i] = (EDGE >> index[i]) as f32;
-            let far = f32::from_bits((((halvings - last).max(0) + 127) as u32) << 23);
-            within.0[i] = if is_beyond { mantissa * far } else { mantissa };
-            way.0[i] = if is_beyond { 0.0 } else { mantissa - 1.0 };
-            beyond.0[i] = if is_beyond { 2.0 / (mantissa * far) } else { 1.0 };
-            // Nearer than the largest map the pattern repeats more often: every other of its strokes lies where they
-            // lay. Pictures have no such strokes.
-            let near = if repeats_near { -halvings.min(0) } else { 0 };
-            repeats.0[i] = f32::from_bits(((near + 127) as u32) << 23);
+            halvings[i] = (bounded.0[i].to_bits() >> 23) as i32 - 127;
         }
-        let half = F32x8::splat(0.5);
-        let (x, y) = (u * repeats * size, v * repeats * size);
-        let mut orders = [0u32; LANES];
-        let mut distances = [F32x8::ZERO; 2];
+        for i in 0..LANES {
+            mantissa.0[i] = f32::from_bits((bounded.0[i].to_bits() & 0x007f_ffff) | 0x3f80_0000);
+        }
+        // Neighbors mostly have one map; where they do not, each map is read for all, and each pixel takes its own.
+        let here = Places { u, v, mantissa, darkness };
+        let mut covered = F32x8::ZERO;
+        let mut left = Mask8::ALL;
+        while let Some(next) = (0..LANES).find(|&i| left.has(i)) {
+            let mut own = Mask8::NONE;
+            for i in 0..LANES {
+                own.0[i] = if halvings[i] == halvings[next] { u32::MAX } else { 0 };
+            }
+            covered = own.pick(self.at(halvings[next], &here), covered);
+            left = left & !own;
+        }
+        covered
+    }
+
+    /// Returns how much strokes of one map cover, that of so many halvings.
+    #[expect(clippy::needless_range_loop, reason = "several arrays are read and written lane by lane")]
+    #[inline(always)]
+    fn at(&self, halvings: i32, here: &Places) -> F32x8 {
+        let &Places { u, v, mantissa, darkness } = here;
+        let (zero, one, half) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(0.5));
+        let power = |exponent: i32| f32::from_bits(((exponent + 127) as u32) << 23);
+        let last = self.levels.len() as i32 - 1;
+        let level = &self.levels[halvings.clamp(0, last) as usize];
+        // Beyond the smallest map strokes thin out.
+        let (within, way, beyond) = if halvings > last {
+            let far = mantissa * F32x8::splat(power(halvings - last));
+            (far, zero, F32x8::splat(2.0) / far)
+        } else {
+            (mantissa, mantissa - one, one)
+        };
+        // Nearer than the largest map the pattern repeats more often: every other of its strokes lies where they lay.
+        // Pictures have no such strokes.
+        let repeats = if self.set == Set::Images { 1.0 } else { power(-halvings.min(0)) };
+        let scale = F32x8::splat(repeats * level.size as f32);
+        let (x, y) = (u * scale, v * scale);
+        let mut texels = [0u32; LANES];
+        let mut distances = [zero; 2];
         if let Some(across) = self.across {
             // Strokes are straight over a texel: what lies between its middle and the place is added.
-            let (mut right, mut down) = (F32x8::ZERO, F32x8::ZERO);
+            let (column, row) = (floor(x), floor(y));
+            let (right, down) = (x - column - half, y - row - half);
+            let [columns, rows] = [column, row].map(|c| (c + F32x8::splat(WHOLE)).0);
+            let (mask, shift) = (level.size - 1, level.shift);
+            let mut places = [0u32; LANES];
             for i in 0..LANES {
-                let (x0, y0) = (x.0[i].floor(), y.0[i].floor());
-                (right.0[i], down.0[i]) = (x.0[i] - x0 - 0.5, y.0[i] - y0 - 0.5);
-                let level = &self.levels[index[i] as usize];
-                let mask = level.size as i32 - 1;
-                orders[i] = level.texels[((y0 as i32 & mask) << level.shift | (x0 as i32 & mask)) as usize];
+                places[i] = (rows[i].to_bits() & mask) << shift | (columns[i].to_bits() & mask);
+            }
+            for i in 0..LANES {
+                texels[i] = level.texels[places[i] as usize];
             }
             for (family, distance) in distances.iter_mut().enumerate() {
-                let mut stored = F32x8::ZERO;
+                let mut stored = zero;
                 for i in 0..LANES {
-                    stored.0[i] = (orders[i] >> (16 * family) & 255) as f32;
+                    stored.0[i] = (texels[i] >> (16 * family) & 255) as i32 as f32;
                 }
                 let [a, b] = across[family].map(F32x8::splat);
                 let middle = (stored - F32x8::splat(MIDDLE)) * F32x8::splat(1.0 / SIGNED_STEPS);
@@ -216,44 +261,68 @@ impl Hatching {
         } else {
             let mut sums = [0u32; LANES];
             for i in 0..LANES {
-                let level = &self.levels[index[i] as usize];
-                (sums[i], orders[i]) = level.between(x.0[i] - 0.5, y.0[i] - 0.5);
+                (sums[i], texels[i]) = level.between(x.0[i] - 0.5, y.0[i] - 0.5);
             }
             for (family, distance) in distances.iter_mut().enumerate() {
                 for i in 0..LANES {
-                    distance.0[i] = (sums[i] >> (16 * family) & 0xffff) as f32 * (1.0 / (256.0 * STEPS));
+                    distance.0[i] =
+                        (sums[i] >> (16 * family) & 0xffff) as i32 as f32 * (1.0 / (256.0 * STEPS));
                 }
             }
         }
-        let (zero, one, ramp) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(self.ramp));
+        let ramp = F32x8::splat(self.ramp);
         if self.set == Set::Images {
             let threshold = distances[0] * F32x8::splat(1.25 * STEPS / 255.0);
             return ((darkness - threshold) * ramp + half).max(zero).min(one);
         }
         let thickness = F32x8::splat(self.half_width) * beyond;
-        let pixels = F32x8::splat(1.0) / within;
+        let pixels = one / within;
         let mut clear = one;
-        for family in 0..2 {
+        for (family, distance) in distances.into_iter().enumerate() {
             if !darkness.above(F32x8::splat(self.earliest[family])).any() {
                 continue;
             }
-            let (mut begin, mut change, mut thins) = (zero, zero, one);
+            let (mut begin, mut change, mut stays) = (zero, zero, Mask8::NONE);
             for i in 0..LANES {
-                let order = (orders[i] >> (8 + 16 * family) & 7) as usize;
-                begin.0[i] = self.begins[family][order];
-                change.0[i] = self.changes[family][order];
-                thins.0[i] = if order == 0 { 1.0 - way.0[i] } else { 1.0 };
+                let order = (texels[i] >> (8 + 16 * family) & 7) as usize;
+                [begin.0[i], change.0[i]] = self.begins[family][order];
             }
+            for i in 0..LANES {
+                stays.0[i] = if texels[i] >> (8 + 16 * family) & 7 == 0 { 0 } else { u32::MAX };
+            }
+            let thins = stays.pick(one, one - way);
             let grown = ((darkness - begin - change * way) * ramp).max(zero).min(one);
             let grown = if self.set == Set::Dots { grown.sqrt() } else { grown };
             let reach = thickness * grown * thins;
             // A stroke thinner than a pixel covers as much of it as it is wide.
             let most = (reach + reach).min(one);
-            let covered = (reach + half - distances[family] * pixels).max(zero).min(most);
+            let covered = (reach + half - distance * pixels).max(zero).min(most);
             clear = clear * (one - covered);
         }
         one - clear
     }
+}
+
+#[inline(always)]
+fn floor(numbers: F32x8) -> F32x8 {
+    let mut all = F32x8::ZERO;
+    for (floor, number) in all.0.iter_mut().zip(numbers.0) {
+        *floor = number.floor();
+    }
+    all
+}
+
+/// The lowest bits of a whole number are those of its sum with this one, unless it is so large that single precision
+/// cannot tell where in the pattern it lies.
+const WHOLE: f32 = 12_582_912.0;
+
+/// Eight places on the pattern.
+struct Places {
+    u: F32x8,
+    v: F32x8,
+    /// Width of a pixel in texels of its map: from 1 to the next map's 2.
+    mantissa: F32x8,
+    darkness: F32x8,
 }
 
 /// Reads thresholds, or spreads them.
@@ -290,22 +359,22 @@ fn thresholds(text: &str, set: Set, count: usize) -> Result<Vec<f32>, HatchError
 
 /// Returns at which darkness strokes of each order begin, for the two families, and by what that changes on the way to
 /// the next map. The first half of the thresholds is that of the first family; the sparsest strokes come first.
-fn orders(thresholds: &[f32], set: Set) -> [[[f32; MOST_LEVELS]; 2]; 2] {
+fn orders(thresholds: &[f32], set: Set) -> [[[f32; 2]; MOST_LEVELS]; 2] {
     const NEVER: f32 = 9.0;
     let mut sorted = thresholds.to_vec();
     sorted.sort_by(f32::total_cmp);
     let middle = sorted.len().div_ceil(2);
     let families =
         if set == Set::Dots { [&sorted[..], &sorted[..]] } else { [&sorted[..middle], &sorted[middle..]] };
-    let (mut begins, mut changes) = ([[NEVER; MOST_LEVELS]; 2], [[0.0; MOST_LEVELS]; 2]);
+    let mut begins = [[[NEVER, 0.0]; MOST_LEVELS]; 2];
     for (family, of) in families.iter().enumerate().filter(|(_, of)| !of.is_empty()) {
         let of_order = |order: usize| of[of.len() - 1 - order.min(of.len() - 1)];
-        for order in 0..MOST_LEVELS {
-            begins[family][order] = of_order(order);
-            changes[family][order] = if order == 0 { 0.0 } else { of_order(order - 1) - of_order(order) };
+        for (order, begins) in begins[family].iter_mut().enumerate() {
+            let change = if order == 0 { 0.0 } else { of_order(order - 1) - of_order(order) };
+            *begins = [of_order(order), change];
         }
     }
-    [begins, changes]
+    begins
 }
 
 /// Reads pictures of strokes.

@@ -3,6 +3,7 @@
 use crate::stroke::{Kind, Stroke};
 use crate::style::Styles;
 use glam::Vec3;
+use polyptych_core::lanes::{F32x8, I32x8, LANES};
 
 /// Length of a dash and of the gap after it, pixels.
 const DASH: [f32; 2] = [5.0, 4.0];
@@ -16,22 +17,23 @@ pub(crate) struct Ink {
     words: Vec<u16>,
     /// Which rows have any.
     touched: Vec<bool>,
-    width: usize,
+    /// Words of a row: those of its pixels, and some more that are never shown, so that eight fit anywhere.
+    stride: usize,
 }
 
 impl Ink {
     /// Wipes some rows.
     pub(crate) fn clear(&mut self, width: u32, rows: u32) {
-        let (width, rows) = (width as usize, rows as usize);
-        if self.width != width || self.touched.len() < rows {
+        let (stride, rows) = (width as usize + LANES, rows as usize);
+        if self.stride != stride || self.touched.len() < rows {
             self.words.clear();
-            self.words.resize(width * rows, 0);
+            self.words.resize(stride * rows, 0);
             self.touched.clear();
             self.touched.resize(rows, false);
-            self.width = width;
+            self.stride = stride;
         }
         for (row, touched) in self.touched.iter_mut().enumerate().filter(|(_, touched)| **touched) {
-            self.words[row * width..(row + 1) * width].fill(0);
+            self.words[row * stride..(row + 1) * stride].fill(0);
             *touched = false;
         }
     }
@@ -47,7 +49,7 @@ impl Ink {
         let half = pen.width * 0.5;
         // Thinner than a pixel is as much lighter.
         let most = pen.width.min(1.0) * 255.0;
-        let key = u16::from(stroke.style) << 3 | stroke.kind as u16;
+        let key = i32::from(u16::from(stroke.style) << 3 | stroke.kind as u16);
         let ([ax, ay], [bx, by]) = (stroke.from, stroke.to);
         let (dx, dy) = (bx - ax, by - ay);
         let square = dx * dx + dy * dy;
@@ -55,38 +57,53 @@ impl Ink {
         let reach = half.max(0.5) + 0.5;
         let top = (ay.min(by) - reach).floor().max(first_row as f32) as u32;
         let bottom = (ay.max(by) + reach).ceil().clamp(0.0, (first_row + rows) as f32) as u32;
-        let is_steep = dy.abs() > dx.abs();
+        let width = self.stride - LANES;
+        let is_level = dy.abs() <= 1e-6;
+        let inverse = 1.0 / dy;
         for y in top..bottom {
             let center = y as f32 + 0.5;
             // The part of the line that is near this row.
-            let (near, far) = if dy.abs() > 1e-6 {
-                let [p, q] = [center - reach, center + reach].map(|edge| ((edge - ay) / dy).clamp(0.0, 1.0));
-                (p.min(q), p.max(q))
-            } else {
+            let (near, far) = if is_level {
                 (0.0, 1.0)
+            } else {
+                let p = ((center - reach - ay) * inverse).clamp(0.0, 1.0);
+                let q = ((center + reach - ay) * inverse).clamp(0.0, 1.0);
+                (p.min(q), p.max(q))
             };
-            let [p, q] = [near, far].map(|part| ax + dx * part);
+            let (p, q) = (ax + dx * near, ax + dx * far);
             let left = (p.min(q) - reach).floor().max(0.0) as usize;
-            let right = ((p.max(q) + reach).ceil().max(0.0) as usize).min(self.width);
+            let right = ((p.max(q) + reach).ceil().max(0.0) as usize).min(width);
             if left >= right {
                 continue;
             }
             let row = (y - first_row) as usize;
             self.touched[row] = true;
-            let words = &mut self.words[row * self.width + left..row * self.width + right];
-            for (x, word) in (left..).zip(words) {
-                let (px, py) = (x as f32 + 0.5 - ax, center - ay);
-                let part = ((px * dx + py * dy) * scale).clamp(0.0, 1.0);
-                let (ox, oy) = (px - dx * part, py - dy * part);
+            let begin = row * self.stride;
+            let words = &mut self.words[begin..begin + self.stride];
+            // Eight pixels at a time; those that are too many are out of reach, or not shown.
+            for x in (left..right).step_by(LANES) {
+                let own: &mut [u16; LANES] =
+                    (&mut words[x..x + LANES]).try_into().expect("a row ends with eight more words");
+                let column = I32x8::count_from(x as i32).to_f64().round() + F32x8::splat(0.5);
+                let (px, py) = (column - F32x8::splat(ax), F32x8::splat(center - ay));
+                let (along_x, along_y) = (F32x8::splat(dx), F32x8::splat(dy));
+                let (zero, one) = (F32x8::ZERO, F32x8::splat(1.0));
+                let part = ((px * along_x + py * along_y) * F32x8::splat(scale)).max(zero).min(one);
+                let (ox, oy) = (px - along_x * part, py - along_y * part);
                 let away = (ox * ox + oy * oy).sqrt();
-                let mut share = (half.max(0.5) + 0.5 - away).clamp(0.0, 1.0) * most;
+                let mut share = (F32x8::splat(reach) - away).max(zero).min(one) * F32x8::splat(most);
                 if stroke.is_hidden {
-                    let along = if is_steep { center } else { x as f32 + 0.5 };
-                    share *= ((DASH[0] - along.rem_euclid(DASH[0] + DASH[1])) + 0.5).clamp(0.0, 1.0) * 0.7;
+                    let is_steep = dy.abs() > dx.abs();
+                    for lane in 0..LANES {
+                        let along = if is_steep { center } else { column.0[lane] };
+                        let gap = ((DASH[0] - along.rem_euclid(DASH[0] + DASH[1])) + 0.5).clamp(0.0, 1.0);
+                        share.0[lane] *= gap * 0.7;
+                    }
                 }
-                let share = share as u16;
-                if share > 0 {
-                    *word = (*word).max(share << 8 | key);
+                for (word, share) in own.iter_mut().zip(share.0) {
+                    let share = share as i32;
+                    let new = if share > 0 { share << 8 | key } else { 0 };
+                    *word = (*word).max(new as u16);
                 }
             }
         }
@@ -99,7 +116,7 @@ impl Ink {
         if !self.touched[row] {
             return;
         }
-        let words = &self.words[row * self.width..(row + 1) * self.width];
+        let words = &self.words[row * self.stride..][..colors.len()];
         for (words, colors) in words.chunks(8).zip(colors.chunks_mut(8)) {
             if words.iter().fold(0, |any, w| any | w) == 0 {
                 continue;

@@ -1,7 +1,9 @@
 //! How do highlights and strokes get onto eight pixels?
 
+use crate::eight::{Eight, numbers};
 use crate::hatch::{EDGE, Hatching, Sticks};
-use crate::paint::{Eight, Look, Painting, gather, numbers};
+use crate::look::Look;
+use crate::paint::Painting;
 use crate::style::{Highlight, Style};
 use glam::{Mat3, Vec3};
 use polyptych_core::camera::Projection;
@@ -11,7 +13,14 @@ use polyptych_core::shade::{highlight, highlights};
 impl Painting<'_> {
     /// Adds highlights.
     #[inline(always)]
-    pub(crate) fn shine(&self, style: &Style, eight: &Eight, cosine: F32x8, color: Vec3x8) -> Vec3x8 {
+    pub(crate) fn shine(
+        &self,
+        style: &Style,
+        eight: &Eight,
+        normal: Vec3x8,
+        cosine: F32x8,
+        color: Vec3x8,
+    ) -> Vec3x8 {
         let Eight { x, y, count, first, direction } = *eight;
         let zero = F32x8::ZERO;
         if !cosine.above(zero).any() {
@@ -35,7 +44,6 @@ impl Painting<'_> {
         }
         let directions = if self.light.uniform.is_some() { None } else { self.view.row(y) };
         let toward = self.toward(x as usize, y, count, directions.as_ref());
-        let normal = gather(self.visible.normal(), first, count);
         let between = toward - direction;
         let half = between.dot(normal) / between.length().max(F32x8::splat(f32::MIN_POSITIVE));
         let faces = cosine.above(zero) & half.above(faint);
@@ -75,7 +83,7 @@ impl Painting<'_> {
         style: &Style,
         eight: &Eight,
         origin: Vec3x8,
-        (own, coded, cosine): (Vec3x8, Vec3x8, F32x8),
+        (own, coded, normal, cosine): (Vec3x8, Vec3x8, Vec3x8, F32x8),
         color: Vec3x8,
     ) -> Vec3x8 {
         let Eight { x, y, count, first, direction } = *eight;
@@ -96,19 +104,20 @@ impl Painting<'_> {
             let scale = F32x8::splat(1.0 / (EDGE as f32 * hatching.scale));
             let u = I32x8::count_from(x as i32).to_f64().round() * scale;
             let v = F32x8::splat(y as f32) * scale;
-            ink = hatching.ink(u, v, F32x8::splat(1.0 / hatching.scale), darkness);
+            ink = hatching.ink(&u, &v, &F32x8::splat(1.0 / hatching.scale), &darkness);
         } else {
             let distance = numbers(self.visible.distance(), first, count);
             let place = origin + direction.scaled(distance);
             let pixel = self.view.pixel_size(1.0) as f32;
             let is_parallel = matches!(self.camera.projection, Projection::Orthographic { .. });
             let pixels = if is_parallel { F32x8::splat(pixel) } else { distance * F32x8::splat(pixel) };
-            let normal = gather(self.visible.normal(), first, count);
             let mut lane = 0;
+            let is_one = ids.iter().fold(0, |differ, id| differ | (id ^ ids[0])) == 0;
             // Run by run of one object.
             while lane < count {
                 let id = ids[lane];
-                let end = (lane + 1..count).find(|&next| ids[next] != id).unwrap_or(count);
+                let other = (lane + 1..count).find(|&next| !is_one && ids[next] != id);
+                let end = other.unwrap_or(count);
                 let index = (id.wrapping_sub(1) as usize).min(self.looks.len() - 1);
                 if id != 0 {
                     let look = &self.looks[index];
@@ -163,7 +172,7 @@ impl Run<'_> {
                     density.0[lane] = change * EDGE as f32;
                 }
             }
-            covered = hatching.ink(u, v, density, darkness);
+            covered = hatching.ink(&u, &v, &density, &darkness);
         } else {
             let p = turned(&look.pattern, place) + Vec3x8::splat(look.eye);
             let n = turned(&look.turn, normal);
@@ -196,8 +205,12 @@ impl Run<'_> {
                 let pick = |a: F32x8, b: F32x8, c: F32x8| chosen[0].pick(a, chosen[1].pick(b, c));
                 let u = pick(planes[0].0, planes[1].0, planes[2].0);
                 let v = pick(planes[0].1, planes[1].1, planes[2].1);
-                covered = covered + hatching.ink(u, v, texels, darkness) * share;
+                covered = covered + hatching.ink(&u, &v, &texels, &darkness) * share;
             }
+        }
+        if lanes.len() == LANES {
+            *ink = covered;
+            return;
         }
         for lane in lanes {
             ink.0[lane] = covered.0[lane];

@@ -14,13 +14,17 @@
 //!  bake       maps of strokes                                        (prepare)
 //!  outline    lines of meshes, from their edges
 //!  cracks     lines of everything else, between pixels
+//!  veil       how far one sees in a part of the picture
 //!  ink        lines as shares of pixels
 //!  light      how much a surface faces the light
 //!  tone       two colors, and steps
 //!  hatch      strokes on dark tones
 //!  paper      what is under a drawing
+//!  look       how an object takes paint
+//!  eight      what is at eight pixels
 //!  lay        highlights and strokes on eight pixels
 //!  paint      a row of the picture
+//!  frame      lines and paint, one after the other
 //!  svg        lines as a file of vectors
 //! ```
 //!
@@ -30,11 +34,14 @@
 mod bake;
 mod cracks;
 mod edges;
+mod eight;
+mod frame;
 mod hatch;
 mod info;
 mod ink;
 mod lay;
 mod light;
+mod look;
 mod outline;
 mod paint;
 mod paper;
@@ -45,6 +52,7 @@ mod stroke;
 mod style;
 mod svg;
 mod tone;
+mod veil;
 
 pub use preset::{Preset, STYLES, StyleError};
 pub use renderer::{Factory, Stylized};

@@ -11,6 +11,7 @@
 use crate::edges::{Edges, NO_FACE};
 use crate::stroke::{Kind, Stroke};
 use crate::style::{Style, Styles};
+use crate::veil::Veil;
 use glam::{DAffine3, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection, View};
 use polyptych_core::framebuffer::Framebuffer;
@@ -35,6 +36,7 @@ pub(crate) struct Scratch {
     /// Which faces are turned to the eye, body by body.
     facing: Vec<bool>,
     pieces: Vec<Piece>,
+    veil: Veil,
 }
 
 /// Some edges of a body, and their lines.
@@ -97,8 +99,13 @@ impl Scratch {
             first_face += body.edges.planes.len();
         }
         self.pieces[count..].iter_mut().for_each(|piece| piece.strokes.clear());
-        let facing = &self.facing[..];
-        for_each_mut(threads, &mut self.pieces[..count], 1, &|_, piece| piece.find(bodies, facing, sight));
+        if count > 0 {
+            self.veil.fill(sight.visible, threads);
+        }
+        let (facing, veil) = (&self.facing[..], &self.veil);
+        for_each_mut(threads, &mut self.pieces[..count], 1, &|_, piece| {
+            piece.find(bodies, facing, sight, veil);
+        });
     }
 
     /// Lists the lines, in the order of bodies and edges.
@@ -112,7 +119,7 @@ impl Scratch {
 
     pub(crate) fn bytes(&self) -> u64 {
         let strokes: usize = self.pieces.iter().map(|p| p.strokes.capacity() * size_of::<Stroke>()).sum();
-        (self.facing.capacity() + strokes) as u64
+        (self.facing.capacity() + strokes) as u64 + self.veil.bytes()
     }
 }
 
@@ -133,7 +140,7 @@ fn turn(body: &Body, camera: &Camera, facing: &mut [bool], threads: &dyn Threads
 }
 
 impl Piece {
-    fn find(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>) {
+    fn find(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>, veil: &Veil) {
         let body = &bodies[self.body];
         let style_index = sight.styles.index(body.object + 1);
         let style = &sight.styles.all[usize::from(style_index)];
@@ -159,7 +166,7 @@ impl Piece {
             let Some(kind) = kind_of(edge, turns, style) else { continue };
             let [a, b] = edge.ends.map(|i| lens.ahead(body.edges.places[i as usize]));
             let line = Line { kind, style: style_index, object: body.object, dashes: style.dashes_hidden };
-            trace(&lens, sight, line, a, b, &mut self.strokes);
+            trace(&lens, sight, veil, line, [a, b], &mut self.strokes);
         }
     }
 }
@@ -253,7 +260,14 @@ impl Lens {
 }
 
 /// Puts the seen parts of an edge, and the hidden ones where they are dashed, into a list.
-fn trace(lens: &Lens, sight: &Sight<'_>, line: Line, a: DVec3, b: DVec3, strokes: &mut Vec<Stroke>) {
+fn trace(
+    lens: &Lens,
+    sight: &Sight<'_>,
+    veil: &Veil,
+    line: Line,
+    [a, b]: [DVec3; 2],
+    strokes: &mut Vec<Stroke>,
+) {
     let Some([a, b]) = lens.clip(a, b) else { return };
     let [from, to] = [a, b].map(|p| lens.pixel(p));
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
@@ -269,6 +283,10 @@ fn trace(lens: &Lens, sight: &Sight<'_>, line: Line, a: DVec3, b: DVec3, strokes
             strokes.push(Stroke { from, to, kind, style, is_hidden: !is_seen, object });
         }
     };
+    let nearest = (-a.z).min(-b.z);
+    if veil.hides(from, to, sight.behind(nearest, lens.is_parallel)) {
+        return put(0, count, false);
+    }
     // Equal steps on the picture are equal steps on a plane before the eye, and of one over the depth.
     let flat = |p: DVec3| if lens.is_parallel { p } else { DVec3::new(p.x / -p.z, p.y / -p.z, 1.0 / -p.z) };
     let (flat_a, flat_b) = (flat(a), flat(b));
@@ -304,6 +322,13 @@ enum Seen {
 }
 
 impl Sight<'_> {
+    /// Returns how far away a surface must be, so that it does not hide for sure what is at a distance: what
+    /// [`Sight::sees`] allows anywhere, and as far as a plane may tell.
+    fn behind(&self, distance: f64, is_parallel: bool) -> f64 {
+        let size = if is_parallel { self.pixel } else { self.pixel * distance };
+        distance - (24.0 + 24.0) * size - 1e-5 * distance
+    }
+
     /// Tells whether nothing hides a place of an edge: `pixel` is where it is on the picture, `place` where in camera
     /// space; `ends` for one at which the body ends.
     #[inline(always)]

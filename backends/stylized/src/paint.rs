@@ -1,15 +1,17 @@
 //! From visible surfaces to colors: tone, highlights, strokes, paper, and lines on top, row by row.
 
 use crate::cracks::shows_nothing;
+use crate::eight::{Eight, gather, numbers, steepness};
 use crate::ink::{Ink, Sheaf};
 use crate::light::Lighting;
+use crate::look::Look;
 use crate::paper::Grain;
 use crate::style::{Highlight, Paper, Show, Style, Styles};
-use glam::{DVec3, Mat3, Vec3};
+use glam::{DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection, RowDirections, View};
 use polyptych_core::framebuffer::{Band, Framebuffer};
 use polyptych_core::lanes::{F32x8, F64x8, I32x8, LANES, Vec3x8};
-use polyptych_core::scene::{Object, Scene};
+use polyptych_core::scene::Scene;
 use polyptych_core::shade::fogged;
 
 /// Rows drawn by one worker at a time.
@@ -18,27 +20,6 @@ pub(crate) const ROWS: u32 = 32;
 const GROUND: usize = 64;
 /// Columns over which its color changes evenly.
 const EVEN: usize = 16;
-
-/// How an object takes paint: what is the same for all its pixels.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Look {
-    pub(crate) specular: f32,
-    pub(crate) shininess: f32,
-    /// Cosine below which its highlight is less than a five-hundredth: not seen.
-    pub(crate) faint: f32,
-    /// Whether its color channel holds texture coordinates and the slot of its material.
-    pub(crate) is_coded: bool,
-    /// Edge of the strokes' pattern in object space, before scaling.
-    pub(crate) period: f64,
-    /// From places relative to the eye to the pattern.
-    pub(crate) pattern: Mat3,
-    /// Where the eye is in the pattern.
-    pub(crate) eye: Vec3,
-    /// Turns normals to the body's axes.
-    pub(crate) turn: Mat3,
-    /// Pattern in a meter.
-    pub(crate) repeats: f32,
-}
 
 /// Buffers of a band.
 #[derive(Default)]
@@ -51,26 +32,6 @@ pub(crate) struct Scratch {
 impl Scratch {
     pub(crate) fn bytes(&self) -> usize {
         self.facing.capacity() * 4 + self.ink.bytes()
-    }
-}
-
-impl Look {
-    /// Places the pattern for a frame.
-    pub(crate) fn place(&mut self, object: &Object, camera: &Camera, scale: f32) {
-        let period = self.period * f64::from(scale);
-        if !(period > 0.0 && period.is_finite()) {
-            return;
-        }
-        let from_world = object.world_from_object.inverse();
-        self.pattern = (from_world.matrix3 * (1.0 / period)).as_mat3();
-        // Whole periods away it is the same, and nearer to the numbers that can be told apart.
-        let eye = from_world.transform_point3(camera.eye) / period;
-        self.eye = (eye - eye.floor()).as_vec3();
-        let turn = object.world_from_object.matrix3.transpose();
-        let largest =
-            [turn.x_axis, turn.y_axis, turn.z_axis].iter().map(|a| a.abs().max_element()).fold(0.0, f64::max);
-        self.turn = (turn * (1.0 / largest)).as_mat3();
-        self.repeats = (from_world.matrix3.determinant().abs().cbrt() / period) as f32;
     }
 }
 
@@ -88,42 +49,6 @@ pub(crate) struct Painting<'a> {
     /// Nearest and farthest distance of the scene, to show depth.
     pub(crate) depths: [f32; 2],
     pub(crate) any_coded: bool,
-}
-
-/// Eight pixels of a row.
-#[derive(Clone, Copy)]
-pub(crate) struct Eight {
-    pub(crate) x: u32,
-    pub(crate) y: u32,
-    pub(crate) count: usize,
-    pub(crate) first: usize,
-    /// Unit vectors from the eye.
-    pub(crate) direction: Vec3x8,
-}
-
-/// Reads up to eight vectors; the rest are zero.
-#[inline(always)]
-pub(crate) fn gather(from: &[Vec3], first: usize, count: usize) -> Vec3x8 {
-    let mut all = Vec3x8::splat(Vec3::ZERO);
-    if count == LANES {
-        let eight: &[Vec3; LANES] = from[first..first + LANES].try_into().expect("eight vectors");
-        for (lane, v) in eight.iter().enumerate() {
-            (all.x.0[lane], all.y.0[lane], all.z.0[lane]) = (v.x, v.y, v.z);
-        }
-    } else {
-        from[first..first + count].iter().enumerate().for_each(|(lane, v)| all.set(lane, *v));
-    }
-    all
-}
-
-#[inline(always)]
-pub(crate) fn numbers(from: &[f32], first: usize, count: usize) -> F32x8 {
-    if count == LANES {
-        return F32x8::load(&from[first..]);
-    }
-    let mut all = F32x8::ZERO;
-    all.0[..count].copy_from_slice(&from[first..first + count]);
-    all
 }
 
 impl Painting<'_> {
@@ -368,11 +293,17 @@ impl Painting<'_> {
             F32x8::ZERO
         };
         let mut color = style.tone.colors(own, cosine, slope);
+        let takes_normal = style.highlight != Highlight::Off || style.hatching.is_some();
+        let normal = if takes_normal {
+            gather(self.visible.normal(), first, count)
+        } else {
+            Vec3x8::splat(Vec3::ZERO)
+        };
         if style.highlight != Highlight::Off {
-            color = self.shine(style, eight, cosine, color);
+            color = self.shine(style, eight, normal, cosine, color);
         }
         if let Some(hatching) = &style.hatching {
-            color = self.hatch(hatching, style, eight, origin, (own, coded, cosine), color);
+            color = self.hatch(hatching, style, eight, origin, (own, coded, normal, cosine), color);
         }
         if style.paper.grain > 0.0 {
             let grain = self.grain.at(eight.x, eight.y);
@@ -430,11 +361,4 @@ impl Painting<'_> {
             own.set(lane, color);
         }
     }
-}
-
-/// Returns by how much numbers change to the row before or after, whichever is less.
-#[inline(always)]
-fn steepness(here: F32x8, all: &[f32], before: usize, after: usize) -> F32x8 {
-    let (before, after) = (F32x8::load(&all[before..]), F32x8::load(&all[after..]));
-    (here - before).abs().min((after - here).abs())
 }

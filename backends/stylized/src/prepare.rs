@@ -3,8 +3,8 @@
 
 use crate::edges::Edges;
 use crate::hatch::Sticks;
+use crate::look::Look;
 use crate::outline::Body;
-use crate::paint::Look;
 use crate::stroke::Kind;
 use crate::style::Styles;
 use glam::Vec3;

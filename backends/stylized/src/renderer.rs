@@ -1,28 +1,22 @@
 //! How does the host drive the shader: an inner back end for visibility, and the style laid over it?
 
-use crate::cracks::{self, Surfaces};
+use crate::frame::{Buffers, Ready, decode};
 use crate::hatch::Hatching;
 use crate::info::info;
-use crate::ink::Sheaf;
-use crate::light::Lighting;
-use crate::outline::{self, Sight, keeps_lines};
-use crate::paint::{Look, Painting, ROWS, Scratch};
+use crate::paint::ROWS;
 use crate::paper::Grain;
 use crate::prepare::{Coded, Outlines, colorful, looks, outlines_forecast};
 use crate::preset::Preset;
 use crate::stroke::Stroke;
 use crate::style::Styles;
-use glam::DVec3;
-use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
-use polyptych_core::parallel::{Threads, for_each_mut};
-use polyptych_core::scene::{Light, Scene};
+use polyptych_core::scene::Scene;
 use polyptych_core::seam::{
-    BackendFactory, BackendInfo, Cancelled, Control, Counter, Frame, Need, PassPlan, Phases, Plan, Prepared,
-    Registry, RenderError, Renderer, Report, Settings, Survey,
+    BackendFactory, BackendInfo, Control, Counter, Frame, Need, PassPlan, Phases, Plan, Prepared, Registry,
+    RenderError, Renderer, Report, Settings, Survey,
 };
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Makes [`Stylized`] renderers.
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,28 +43,6 @@ pub struct Stylized {
     scratch: Buffers,
 }
 
-/// What a scene was prepared for.
-struct Ready {
-    scene: Arc<Scene>,
-    styles: Styles,
-    lights: Vec<Light>,
-    colorful: Vec<bool>,
-    /// Around the scene.
-    ball: (DVec3, f64),
-}
-
-/// Buffers that live from frame to frame.
-struct Buffers {
-    visible: Framebuffer,
-    looks: Vec<Look>,
-    outline: outline::Scratch,
-    cracks: Vec<cracks::Scratch>,
-    lines: Sheaf,
-    bands: Vec<Mutex<Scratch>>,
-    /// For cameras that bend lines: nothing has them from its edges.
-    without: Vec<bool>,
-}
-
 impl Stylized {
     /// Makes a renderer that takes its inner back end from a registry.
     #[must_use]
@@ -83,15 +55,7 @@ impl Stylized {
             outlines: Outlines::default(),
             coded: Coded::default(),
             grain: Grain::new(),
-            scratch: Buffers {
-                visible: Framebuffer::new(0, 0, Channels::NONE),
-                looks: Vec::new(),
-                outline: outline::Scratch::default(),
-                cracks: Vec::new(),
-                lines: Sheaf::default(),
-                bands: Vec::new(),
-                without: Vec::new(),
-            },
+            scratch: Buffers::default(),
         }
     }
 
@@ -294,137 +258,6 @@ impl Stylized {
     fn bytes(&self) -> u64 {
         let styles = self.ready.iter().flat_map(|r| &r.styles.all);
         let maps: u64 = styles.filter_map(|s| s.hatching.as_ref()).map(|h| h.bytes()).sum();
-        let buffers = &self.scratch;
-        let bands: usize = buffers.bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
-        let cracks: usize = buffers.cracks.iter().map(cracks::Scratch::bytes).sum();
-        let drawn = buffers.visible.bytes() + buffers.outline.bytes() + buffers.lines.bytes();
-        maps + self.outlines.bytes() + self.grain.bytes() + drawn + (bands + cracks) as u64
+        maps + self.outlines.bytes() + self.grain.bytes() + self.scratch.bytes()
     }
-}
-
-impl Buffers {
-    fn reserve(&mut self, width: u32, height: u32, channels: Channels, objects: usize) {
-        let bands = height.div_ceil(ROWS) as usize;
-        if (self.visible.width(), self.visible.height(), self.visible.channels()) != (width, height, channels)
-        {
-            self.visible = Framebuffer::new(width, height, channels);
-            self.cracks = (0..bands).map(|_| cracks::Scratch::default()).collect();
-            self.bands = (0..bands).map(|_| Mutex::default()).collect();
-        }
-        self.without.resize(objects, false);
-    }
-
-    /// Finds the lines of what was seen.
-    fn find_lines(
-        &mut self,
-        ready: &Ready,
-        outlines: &Outlines,
-        camera: &Camera,
-        control: &Control<'_>,
-    ) -> Result<(), Cancelled> {
-        let Self { visible, outline, cracks, lines, without, .. } = self;
-        let visible = &*visible;
-        lines.strokes.clear();
-        if !ready.styles.draw_lines() {
-            return Ok(());
-        }
-        let view = camera.view(visible.width(), visible.height());
-        let straight = keeps_lines(&camera.projection);
-        if straight {
-            let sight = Sight { camera, view, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
-            outline.fill(&outlines.bodies, &sight, control.threads);
-        } else {
-            outline.clear();
-        }
-        control.check()?;
-        let surfaces = Surfaces {
-            visible,
-            view,
-            styles: &ready.styles,
-            pixel: view.pixel_size(1.0),
-            is_parallel: matches!(camera.projection, Projection::Orthographic { .. }),
-            outlined: if straight { &outlines.outlined } else { without },
-            colorful: &ready.colorful,
-        };
-        for_each_mut(control.threads, cracks, 1, &|band, scratch| {
-            let first = band as u32 * ROWS;
-            if control.is_cancelled() {
-                scratch.strokes.clear();
-            } else {
-                surfaces.find(first..first + ROWS, scratch);
-            }
-        });
-        control.check()?;
-        lines.strokes.extend(outline.strokes());
-        lines.strokes.extend(cracks.iter().flat_map(|c| &c.strokes));
-        Ok(())
-    }
-
-    /// Finds lines and paints.
-    fn paint(
-        &mut self,
-        ready: &Ready,
-        outlines: &Outlines,
-        grain: &Grain,
-        camera: &Camera,
-        target: &mut Framebuffer,
-        phases: &mut Phases,
-        control: &Control<'_>,
-    ) -> Result<(), Cancelled> {
-        self.find_lines(ready, outlines, camera, control)?;
-        self.lines.sort(&ready.styles, target.height(), ROWS);
-        phases.end("contours");
-        let scene = &*ready.scene;
-        let hatching = |index: usize| {
-            let style = usize::from(ready.styles.index(index as u32 + 1));
-            ready.styles.all[style].hatching.as_ref()
-        };
-        for (index, look) in self.looks.iter_mut().enumerate() {
-            if let Some(hatching) = hatching(index) {
-                look.place(&scene.objects[index], camera, hatching.scale);
-            }
-        }
-        let (center, radius) = ready.ball;
-        let middle = center.distance(camera.eye);
-        let depths = [(middle - radius).max(0.0) as f32, (middle + radius) as f32];
-        let painting = Painting {
-            scene,
-            styles: &ready.styles,
-            looks: &self.looks,
-            view: camera.view(target.width(), target.height()),
-            camera,
-            visible: &self.visible,
-            light: Lighting::of(&ready.lights),
-            grain,
-            lines: &self.lines,
-            depths,
-            any_coded: self.looks.iter().any(|look| look.is_coded),
-        };
-        let bands = &self.bands;
-        target.for_each_band(control.threads, ROWS, &|mut band| {
-            if !control.is_cancelled() {
-                let scratch = &bands[(band.first_row / ROWS) as usize];
-                painting.draw(&mut band, &mut scratch.lock().unwrap_or_else(PoisonError::into_inner));
-                control.finished(&band);
-            }
-        });
-        control.check()?;
-        phases.end("tone");
-        Ok(())
-    }
-}
-
-/// Puts colors in place of texture coordinates, for those who asked for colors.
-fn decode(ready: &Ready, coded: &[bool], visible: &mut Framebuffer, threads: &dyn Threads) {
-    visible.for_each_band(threads, ROWS, &|band| {
-        for (id, albedo) in band.id.iter().zip(band.albedo) {
-            let index = id.wrapping_sub(1) as usize;
-            if coded.get(index).copied().unwrap_or(false) {
-                let material =
-                    ready.scene.material(&ready.scene.objects[index], albedo.z.round().max(0.0) as usize);
-                let at = Some([albedo.x, albedo.y]);
-                *albedo = ready.scene.base_color(material, at, glam::Vec3::ZERO, glam::Vec3::Y, 0.0).0;
-            }
-        }
-    });
 }

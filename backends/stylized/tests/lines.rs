@@ -279,6 +279,19 @@ fn toggles(pictures: &[Vec<f32>]) -> usize {
     pictures.windows(2).map(count).sum()
 }
 
+/// Counts pixels that pass a half and, within half of the frames that a line takes to pass by, turn back: what flickers, and
+/// not what a line passes on its way.
+fn turns(pictures: &[Vec<f32>]) -> usize {
+    const SOON: usize = 8;
+    let turns_of = |pixel: usize| {
+        let is_dark = |frame: &Vec<f32>| frame[pixel] < 0.5;
+        let changes: Vec<usize> =
+            (1..pictures.len()).filter(|&i| is_dark(&pictures[i]) != is_dark(&pictures[i - 1])).collect();
+        changes.windows(2).filter(|w| w[1] - w[0] < SOON).count()
+    };
+    (0..pictures[0].len()).map(turns_of).sum()
+}
+
 /// Shrinks a picture.
 fn reduced(picture: &Framebuffer, times: u32) -> Vec<f32> {
     let width = picture.width() / times;
@@ -322,6 +335,9 @@ fn lines_toggle_no_more_pixels_than_those_of_an_antialiased_reference() {
     let (ours, theirs) = (toggles(&drawn), toggles(&truth));
     println!("{ours} toggles, {theirs} of the reference");
     assert!(ours <= theirs, "{ours} toggles, {theirs} of the reference");
+    let (ours, theirs) = (turns(&drawn), turns(&truth));
+    println!("{ours} turn back, {theirs} of the reference");
+    assert!(ours <= theirs, "{ours} turn back, {theirs} of the reference");
 }
 
 #[test]

@@ -1,0 +1,47 @@
+//! What is at eight pixels of a row?
+
+use glam::Vec3;
+use polyptych_core::lanes::{F32x8, LANES, Vec3x8};
+
+/// Eight pixels of a row.
+#[derive(Clone, Copy)]
+pub(crate) struct Eight {
+    pub(crate) x: u32,
+    pub(crate) y: u32,
+    pub(crate) count: usize,
+    pub(crate) first: usize,
+    /// Unit vectors from the eye.
+    pub(crate) direction: Vec3x8,
+}
+
+/// Reads up to eight vectors; the rest are zero.
+#[inline(always)]
+pub(crate) fn gather(from: &[Vec3], first: usize, count: usize) -> Vec3x8 {
+    let mut all = Vec3x8::splat(Vec3::ZERO);
+    if count == LANES {
+        let eight: &[Vec3; LANES] = from[first..first + LANES].try_into().expect("eight vectors");
+        for (lane, v) in eight.iter().enumerate() {
+            (all.x.0[lane], all.y.0[lane], all.z.0[lane]) = (v.x, v.y, v.z);
+        }
+    } else {
+        from[first..first + count].iter().enumerate().for_each(|(lane, v)| all.set(lane, *v));
+    }
+    all
+}
+
+#[inline(always)]
+pub(crate) fn numbers(from: &[f32], first: usize, count: usize) -> F32x8 {
+    if count == LANES {
+        return F32x8::load(&from[first..]);
+    }
+    let mut all = F32x8::ZERO;
+    all.0[..count].copy_from_slice(&from[first..first + count]);
+    all
+}
+
+/// Returns by how much numbers change to the row before or after, whichever is less.
+#[inline(always)]
+pub(crate) fn steepness(here: F32x8, all: &[f32], before: usize, after: usize) -> F32x8 {
+    let (before, after) = (F32x8::load(&all[before..]), F32x8::load(&all[after..]));
+    (here - before).abs().min((after - here).abs())
+}
