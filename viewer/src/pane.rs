@@ -92,6 +92,12 @@ impl Pane {
         self.ordered.as_ref().is_some_and(|ordered| ordered.is(order))
     }
 
+    /// Stops what is being drawn, and forgets that it was ordered.
+    pub(crate) fn leave(&mut self) {
+        self.ordered = None;
+        self.painter.stop();
+    }
+
     /// Orders the same picture anew: after a failure.
     pub(crate) fn try_again(&mut self) {
         (self.ordered, self.failure) = (None, None);

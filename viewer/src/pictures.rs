@@ -83,10 +83,13 @@ impl Viewer {
         if let Some(first) = self.panes.first() {
             (truth.size, truth.channel) = (first.size, first.channel);
         }
-        if let Some(order) = self.order(&truth).filter(|order| !truth.has_ordered(order)) {
-            // The ruler is slow: it waits until all others are done, and does not keep them from their threads.
-            truth.waits = !self.panes.iter().all(Pane::is_at_rest);
-            if truth.waits { truth.painter.stop() } else { truth.want(order) }
+        let order = self.order(&truth).filter(|order| !truth.has_ordered(order));
+        // The ruler is slow: it waits until all others are done, and does not keep them from their cores.
+        truth.waits = order.is_some() && !self.panes.iter().all(Pane::is_at_rest);
+        match order {
+            Some(_) if truth.waits => truth.leave(),
+            Some(order) => truth.want(order),
+            None => {}
         }
         self.truth = Some(truth);
     }

@@ -134,7 +134,10 @@ impl Viewer {
                     self.document.edit(scene, "bend", ctx.input(|i| i.time));
                 }
             }
-            Step::Orbit(_) => self.frames = Times::default(),
+            Step::Orbit(_) => {
+                (self.frames, self.whole_frames) = (Times::default(), Times::default());
+                self.panes.iter().for_each(|pane| pane.painter.forget_stops());
+            }
             Step::Shot(file) => self.save_screenshot(Some(file.clone()), ctx),
             Step::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
             Step::Switch(_) | Step::Wait => {}
@@ -177,7 +180,8 @@ impl Viewer {
         match &running.step {
             Step::Orbit(time) => {
                 println!("orbit: {} frames in {:.0} s", running.count, time.as_secs_f64());
-                println!("window's thread: {}", self.frames);
+                println!("window's thread, in our code: {}", self.frames);
+                println!("window's thread, with painting: {}", self.whole_frames);
                 println!("from stop to free: {}", self.stops());
                 for pane in &self.panes {
                     println!("{}: {}", pane.backend, pane.status());

@@ -25,7 +25,7 @@ use polyptych::seam::{Registry, Settings};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Panels that are shown beside the pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -86,8 +86,9 @@ pub struct Viewer {
     pub(crate) left_over: Vec<PathBuf>,
     pub(crate) script: Option<Script>,
     pub(crate) program: Option<Program>,
-    /// How long the window's thread took for each frame.
+    /// How long the window's thread took for each frame, and with laying out and painting all of it.
     pub(crate) frames: Times,
+    pub(crate) whole_frames: Times,
     /// Pictures that are being written.
     pub(crate) writing: Option<Errand<()>>,
 }
@@ -137,6 +138,7 @@ impl Viewer {
             script: None,
             program: None,
             frames: Times::default(),
+            whole_frames: Times::default(),
             writing: None,
         })
     }
@@ -189,14 +191,24 @@ impl Viewer {
     /// Tells whether all panes show their full picture of what was ordered last, and nothing else is under way.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        let truth_is_done = self.truth.as_ref().is_none_or(|truth| truth.is_at_rest() && !truth.waits);
-        self.loading.is_none()
-            && self.saving.is_none()
-            && self.writing.is_none()
-            && !self.compares_still
-            && !self.equal.is_busy()
-            && truth_is_done
-            && self.panes.iter().all(Pane::is_at_rest)
+        self.under_way().is_none()
+    }
+
+    /// Says what is still under way.
+    #[must_use]
+    pub fn under_way(&self) -> Option<&'static str> {
+        let truth_is_drawn = self.truth.as_ref().is_some_and(|truth| !truth.is_at_rest() || truth.waits);
+        [
+            (self.loading.is_some(), "reading a scene"),
+            (self.saving.is_some(), "saving the scene"),
+            (self.writing.is_some(), "writing a picture"),
+            (self.equal.is_busy(), "trying tolerances"),
+            (!self.panes.iter().all(Pane::is_at_rest), "drawing"),
+            (truth_is_drawn, "drawing the reference"),
+            (self.compares_still, "comparing"),
+        ]
+        .into_iter()
+        .find_map(|(is_so, what)| is_so.then_some(what))
     }
 
     /// Returns the map of what differs between the first two panes, row by row, in the mode that shows it.
@@ -287,7 +299,9 @@ impl Viewer {
 }
 
 impl eframe::App for Viewer {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        let before = frame.info().cpu_usage;
+        before.into_iter().for_each(|time| self.whole_frames.add(Duration::from_secs_f32(time)));
         Self::ui(self, ui);
     }
 

@@ -89,7 +89,7 @@ fn a_session_in_a_real_window() {
     let told = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
     println!("{told}the session took {:.1} s", begin.elapsed().as_secs_f64());
     assert!(done.status.success(), "{told}");
-    assert!(told.contains("orbit: ") && told.contains("window's thread: "), "{told}");
+    assert!(told.contains("orbit: ") && told.contains("window's thread, with painting: "), "{told}");
     let seen =
         |name: &str| image::open(shot(name)).unwrap_or_else(|e| panic!("{name}: {e}\n{told}")).into_rgb8();
     let differ = |a: &str, b: &str| {

@@ -153,6 +153,11 @@ impl Painter {
     pub(crate) fn stops(&self) -> Times {
         self.desk.lock().stops.clone()
     }
+
+    /// Begins to count these times anew.
+    pub(crate) fn forget_stops(&self) {
+        self.desk.lock().stops = Times::default();
+    }
 }
 
 impl Drop for Painter {

@@ -35,11 +35,11 @@ fn every_action_of_the_palette_runs_once() {
         // What was opened is closed again, so that one does not hide the next.
         for _ in 0..3 {
             harness.key_press(Key::Escape);
-            harness.run_steps(1);
+            harness.run_steps(2);
         }
         if harness.state().is_on(Action::Turntable) == Some(true) {
             harness.key_press(Key::T);
-            harness.run_steps(1);
+            harness.run_steps(2);
         }
     }
     rest(&mut harness);
