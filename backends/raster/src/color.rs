@@ -91,7 +91,7 @@ impl Spot<'_> {
         let [width, height] = texture.size();
         let size = Vec2::new(width as f32, height as f32);
         let (right, down) = (moved(self.changes.right) * size, moved(self.changes.down) * size);
-        (uv.as_vec2(), level(right.length_squared().max(down.length_squared())))
+        (uv.as_vec2(), Texture::level_of(right.length_squared().max(down.length_squared()), logarithm))
     }
 
     #[inline(never)]
@@ -105,12 +105,6 @@ impl Spot<'_> {
         let moved = |[v, w]: [f32; 2]| Vec2::new((ab * v + ac * w).length(), 0.0);
         texture.triplanar(position, normal, texture.lod(moved(self.changes.right), moved(self.changes.down)))
     }
-}
-
-/// Returns the mip level at which a texel is as large as a pixel that so many texels, squared, run past.
-#[inline(always)]
-fn level(squared: f32) -> f32 {
-    if squared > 1.0 && squared.is_finite() { 0.5 * logarithm(squared) } else { 0.0 }
 }
 
 /// Returns the logarithm to base 2 of a number above 1, to 2e-5: with `t = (m - 1) / (m + 1)` of the mantissa `m`,

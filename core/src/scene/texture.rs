@@ -151,13 +151,24 @@ impl Texture {
         color
     }
 
-    /// Returns the mip level at which a texel is as large as a pixel, from the change of the texture
-    /// coordinates over one pixel to the right and one down (the longer one decides).
+    /// Returns the mip level whose lookups are as wide as a pixel, from the change of the texture coordinates over one
+    /// pixel to the right and one down (the longer one decides); see [`Texture::level_of`].
     #[must_use]
     pub fn lod(&self, duv_dx: Vec2, duv_dy: Vec2) -> f32 {
         let size = Vec2::new(self.levels[0].width as f32, self.levels[0].height as f32);
-        let longer = (duv_dx * size).length_squared().max((duv_dy * size).length_squared());
-        if longer > 1.0 && longer.is_finite() { 0.5 * longer.log2() } else { 0.0 }
+        Self::level_of((duv_dx * size).length_squared().max((duv_dy * size).length_squared()), f32::log2)
+    }
+
+    /// Returns the mip level whose lookups are as wide as a pixel that so many texels, squared, run past.
+    ///
+    /// A texel of width `t` is the mean of a square and is weighted by a tent, with variances of `t^2 / 12` and
+    /// `t^2 / 6`; the mean over a pixel of width `p` has one of `p^2 / 12`. Both are equal for `t = p / sqrt(3)`. At the
+    /// level of `t = p` everything would be blurred over almost two pixels.
+    #[must_use]
+    #[inline(always)]
+    pub fn level_of(texels_squared: f32, log2: impl Fn(f32) -> f32) -> f32 {
+        let ratio = texels_squared * (1.0 / 3.0);
+        if ratio > 1.0 && ratio.is_finite() { 0.5 * log2(ratio) } else { 0.0 }
     }
 }
 
