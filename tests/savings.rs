@@ -31,6 +31,8 @@ fn no_shadow_is_prepared_where_no_light_casts_one_or_no_channel_shows_it() {
         };
         assert!(pass(&plan(&mut studio, &scene, Channels::COLOR), "shadow"), "{backend}");
         assert!(!pass(&plan(&mut studio, &unlit, Channels::COLOR), "shadow"), "{backend}");
+        assert!(pass(&plan(&mut studio, &scene, Channels::COLOR), "normals"), "{backend}");
+        assert!(!pass(&plan(&mut studio, &scene, seen), "normals"), "{backend}: nothing is lit");
         let bytes = |studio: &mut Studio, scene: &Arc<Scene>, channels| {
             studio.draw(backend, scene, &need(scene, channels)).unwrap()
         };
@@ -139,7 +141,7 @@ fn plans_build_nothing_and_name_what_is_built() {
 fn planned_bytes_are_those_that_are_held() {
     // Surfaces that must be found before they can be counted: how many chunks a form fills, and how often vertices of a
     // cloud's surface are split at creases.
-    let unknown = [("voxel", "quadrics"), ("raster", "cloud"), ("stylized", "cloud")];
+    let unknown = [("voxel", "quadrics"), ("raster", "cloud")];
     let mut off = Vec::new();
     for backend in BACKENDS {
         for name in polyptych::builtin::NAMES {

@@ -201,14 +201,23 @@ impl Hatching {
         // Neighbors mostly have one map; where they do not, each map is read for all, and each pixel takes its own.
         let here = Places { u, v, mantissa, darkness };
         let mut covered = F32x8::ZERO;
-        let mut left = Mask8::ALL;
-        while let Some(next) = (0..LANES).find(|&i| left.has(i)) {
-            let mut own = Mask8::NONE;
+        let mut least = halvings[0];
+        for i in 1..LANES {
+            least = least.min(halvings[i]);
+        }
+        loop {
+            let (mut own, mut next) = (Mask8::NONE, i32::MAX);
             for i in 0..LANES {
-                own.0[i] = if halvings[i] == halvings[next] { u32::MAX } else { 0 };
+                own.0[i] = if halvings[i] == least { u32::MAX } else { 0 };
             }
-            covered = own.pick(self.at(halvings[next], &here), covered);
-            left = left & !own;
+            covered = own.pick(self.at(least, &here), covered);
+            for i in 0..LANES {
+                next = next.min(if halvings[i] > least { halvings[i] } else { i32::MAX });
+            }
+            if next == i32::MAX {
+                break;
+            }
+            least = next;
         }
         covered
     }
