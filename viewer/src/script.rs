@@ -43,8 +43,8 @@ enum Step {
 pub struct Script {
     steps: std::vec::IntoIter<Step>,
     running: Option<Running>,
-    /// When the window showed its first pictures in full.
-    begun: Option<Instant>,
+    /// When the program read it, until the first frame.
+    read: Option<Instant>,
 }
 
 #[derive(Debug)]
@@ -68,7 +68,7 @@ impl Script {
         let steps: Result<Vec<_>, _> = lines
             .map(|(i, line)| step(line).ok_or_else(|| format!("line {}: `{line}` is no step", i + 1)))
             .collect();
-        Ok(Self { steps: steps?.into_iter(), running: None, begun: None })
+        Ok(Self { steps: steps?.into_iter(), running: None, read: Some(Instant::now()) })
     }
 }
 
@@ -100,7 +100,9 @@ impl Viewer {
     pub(crate) fn follow_script(&mut self, ctx: &Context) {
         let Some(mut script) = self.script.take() else { return };
         ctx.request_repaint();
-        script.begun.get_or_insert_with(Instant::now);
+        if let Some(read) = script.read.take() {
+            println!("first frame after {:.2} s", read.elapsed().as_secs_f64());
+        }
         let is_done = match &mut script.running {
             Some(running) => self.go_on(running, ctx),
             None => true,
@@ -184,7 +186,12 @@ impl Viewer {
                 println!("window's thread, with painting: {}", self.whole_frames);
                 println!("from stop to free: {}", self.stops());
                 for pane in &self.panes {
-                    println!("{}: {}", pane.backend, pane.status());
+                    println!(
+                        "{}: {}, from stop to free: {}",
+                        pane.backend,
+                        pane.status(),
+                        pane.painter.stops()
+                    );
                 }
             }
             Step::Switch(_) => {

@@ -125,7 +125,7 @@ fn control(ui: &mut egui::Ui, parameter: &Parameter, current: &Value, label: egu
         (ParameterKind::Int { min, max }, Value::Int(value)) => {
             let mut number = *value as f64;
             let range = min as f64..=max as f64;
-            let changed = field::number(ui, parameter.name, &mut number, &range, &unit);
+            let changed = field::number(ui, parameter.name, &mut number, &range, (&unit, 0));
             changed.then(|| (number.round() as i64).to_string())
         }
         (ParameterKind::Float { min, max }, Value::Float(_) | Value::Int(_)) => {
@@ -134,7 +134,8 @@ fn control(ui: &mut egui::Ui, parameter: &Parameter, current: &Value, label: egu
                 Value::Float(value) => *value,
                 Value::Bool(_) | Value::Text(_) => min,
             };
-            field::number(ui, parameter.name, &mut number, &(min..=max), &unit).then(|| number.to_string())
+            field::number(ui, parameter.name, &mut number, &(min..=max), (&unit, field::DECIMALS))
+                .then(|| number.to_string())
         }
         (ParameterKind::Choice { choices }, Value::Text(value)) => {
             let mut chosen = value.as_str();
