@@ -1,6 +1,7 @@
 //! What does a scripted session do? A line each, as in:
 //!
 //! ```text
+//! size 800x500        of the window
 //! do Wipe             an action by its name
 //! panes raster,voxel  the back ends of the panes
 //! open sponza.glb     a scene
@@ -27,6 +28,7 @@ const SPEED: f64 = 0.6;
 /// One thing to do.
 #[derive(Clone, Debug, PartialEq)]
 enum Step {
+    Size([f32; 2]),
     Do(Action),
     Panes(Vec<String>),
     Open(String),
@@ -76,7 +78,13 @@ fn step(line: &str) -> Option<Step> {
     let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
     let rest = rest.trim();
     let seconds = || rest.parse().ok().and_then(|s: f64| Duration::try_from_secs_f64(s).ok());
+    let size = || {
+        let (width, height) = rest.split_once('x')?;
+        let edge = |text: &str| text.parse().ok().filter(|edge| (1.0..=16_384.0).contains(edge));
+        Some([edge(width)?, edge(height)?])
+    };
     Some(match word {
+        "size" => Step::Size(size()?),
         "do" => Step::Do(ACTIONS.iter().find(|entry| entry.name == rest)?.action),
         "panes" if !rest.is_empty() => Step::Panes(rest.split(',').map(|id| id.trim().to_owned()).collect()),
         "open" if !rest.is_empty() => Step::Open(rest.to_owned()),
@@ -121,6 +129,7 @@ impl Viewer {
 
     fn begin(&mut self, step: &Step, ctx: &Context) {
         match step {
+            Step::Size(size) => ctx.send_viewport_cmd(ViewportCommand::InnerSize((*size).into())),
             Step::Do(action) => self.perform(*action, ctx),
             Step::Panes(backends) => {
                 self.set_count(backends.len(), ctx);
@@ -173,7 +182,7 @@ impl Viewer {
                 running.count += 1;
                 running.count > 2 && self.is_at_rest()
             }
-            Step::Do(_) | Step::Panes(_) | Step::Bend(_) | Step::Quit => true,
+            Step::Size(_) | Step::Do(_) | Step::Panes(_) | Step::Bend(_) | Step::Quit => true,
         }
     }
 

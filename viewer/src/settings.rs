@@ -79,6 +79,7 @@ fn panel(ui: &mut egui::Ui, info: &BackendInfo, settings: &mut Settings) {
             groups.push(group(parameter));
         }
     }
+    let mut is_first = true;
     for name in groups {
         let members: Vec<_> = info.parameters.iter().filter(|p| group(p) == name).collect();
         let mut show = |ui: &mut egui::Ui| {
@@ -93,7 +94,8 @@ fn panel(ui: &mut egui::Ui, info: &BackendInfo, settings: &mut Settings) {
             }
         };
         if members.len() > 2 {
-            egui::CollapsingHeader::new(name).default_open(groups_are_few(info)).show(ui, show);
+            let is_open = groups_are_few(info) || std::mem::take(&mut is_first);
+            egui::CollapsingHeader::new(name).default_open(is_open).show(ui, show);
         } else {
             show(ui);
         }

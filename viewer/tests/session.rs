@@ -55,7 +55,7 @@ fn a_session_in_a_real_window() {
     let folder = std::env::temp_dir().join(format!("polyptych-session-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let shot = |name: &str| folder.join(format!("{name}.png"));
-    let mut script = String::from("panes raster,voxel\n");
+    let mut script = String::from("size 640x400\npanes raster,voxel\n");
     let mut add = |line: String| script += &(line + "\n");
     let take = |name: &str| format!("wait\nshot {}", shot(name).display());
     add(take("first"));

@@ -162,8 +162,6 @@ fn choosing_a_style_shows_its_numbers() {
     assert_ne!(harness.state().picture(0).unwrap().0, before, "another style");
     let style = polyptych::stylized::Preset::builtin("toon").unwrap();
     let steps = style.settings["tone.steps"].to_string();
-    harness.get_by_label("tone").click();
-    rest(&mut harness);
     let field = harness.get_by_role_and_label(Role::SpinButton, "tone.steps");
     assert_eq!(field.accesskit_node().numeric_value().map(|n| n.to_string()), Some(steps));
 }
