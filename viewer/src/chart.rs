@@ -103,8 +103,9 @@ impl LiveChart {
 fn power(exponent: f64) -> String {
     let value = 10f64.powf(exponent);
     if (0.01..10_000.0).contains(&value) {
-        let text = format!("{value:.3}");
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        let decimals = (2.0 - exponent.floor()).max(0.0) as usize;
+        let text = format!("{value:.decimals$}");
+        if decimals == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
     } else {
         format!("{value:.1e}")
     }

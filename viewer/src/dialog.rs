@@ -143,5 +143,6 @@ fn window(title: &str) -> egui::Window<'_> {
     egui::Window::new(title)
         .collapsible(false)
         .resizable(false)
+        .fade_in(false)
         .anchor(Align2::CENTER_TOP, Vec2::new(0.0, 90.0))
 }

@@ -9,13 +9,16 @@ pub(crate) const ANY: RangeInclusive<f64> = -1e9..=1e9;
 /// A length.
 pub(crate) const POSITIVE: RangeInclusive<f64> = 1e-6..=1e9;
 
+/// Decimals of numbers that are not whole.
+pub(crate) const DECIMALS: usize = 4;
+
 /// Shows a number by its name. Tells whether it was changed to something in the range.
 pub(crate) fn number(
     ui: &mut Ui,
     name: &str,
     value: &mut f64,
     range: &RangeInclusive<f64>,
-    unit: &str,
+    (unit, decimals): (&str, usize),
 ) -> bool {
     let (mut shown, is_nonsense) = (*value, Cell::new(None));
     let read = |text: &str| {
@@ -24,7 +27,9 @@ pub(crate) fn number(
         number
     };
     let speed = (value.abs() * 0.01).max(0.005 * (range.end() - range.start()).min(1.0));
-    let drag = DragValue::new(&mut shown).speed(speed).max_decimals(4).suffix(unit).custom_parser(read);
+    let speed = if decimals == 0 { speed.max(0.1) } else { speed };
+    let drag =
+        DragValue::new(&mut shown).speed(speed).max_decimals(decimals).suffix(unit).custom_parser(read);
     let response = ui.add(drag);
     response.widget_info(|| WidgetInfo {
         value: Some(*value),
@@ -33,12 +38,11 @@ pub(crate) fn number(
     let place = response.id.with("refusal");
     if is_nonsense.get() == Some(true) {
         refuse(ui, place, "a number is written like 1.5");
-    } else if response.changed() || is_nonsense.get() == Some(false) {
+    } else if shown != *value {
         if range.contains(&shown) {
             accept(ui, place);
-            let is_new = shown != *value;
             *value = shown;
-            return is_new;
+            return true;
         }
         let (low, high) = (range.start(), range.end());
         let words = match (*low > -1e9, *high < 1e9) {
@@ -64,7 +68,7 @@ pub(crate) fn numbers<const N: usize>(
     ui.horizontal_wrapped(|ui| {
         for (i, value) in values.into_iter().enumerate() {
             let own = if N == 1 { name.to_owned() } else { format!("{name} {i}") };
-            is_changed |= number(ui, &own, value, range, "");
+            is_changed |= number(ui, &own, value, range, ("", DECIMALS));
         }
     });
     ui.end_row();

@@ -92,7 +92,7 @@ impl Viewer {
         let is_left_over = self.left_over.iter().any(|path| path.to_string_lossy() == name);
         if self.is_reloading {
             // The same scene, changed elsewhere: the view stays, and undo leads back.
-            let scene: Arc<Scene> = Arc::new(Document::new(scene, None).scene.as_ref().clone());
+            let scene = Document::new(scene, None).scene;
             self.document.edit(scene.clone(), "reload", ctx.input(|i| i.time));
             self.document.was_saved(scene, Path::new(&name));
             self.is_reloading = false;
@@ -108,10 +108,9 @@ impl Viewer {
             self.document.mark_changed();
             self.left_over.retain(|path| path.to_string_lossy() != name);
             self.keep(ctx);
-            if let Some(keeper) = &self.keeper {
-                keeper.wait();
+            if self.keeper.as_ref().is_some_and(Keeper::holds_a_scene) {
+                let _ = std::fs::remove_file(name);
             }
-            let _ = std::fs::remove_file(name);
         } else {
             self.memory.opened(&name);
         }

@@ -139,6 +139,12 @@ impl Keeper {
         }
     }
 
+    /// Tells whether the scene is written by now, after waiting for it.
+    pub(crate) fn holds_a_scene(&self) -> bool {
+        self.wait();
+        own_file(&self.folder).exists()
+    }
+
     /// Returns why nothing can be kept, once.
     pub(crate) fn failure(&self) -> Option<String> {
         self.desk.lock().failure.take()

@@ -64,7 +64,9 @@ impl Viewer {
             pane.draw(ui.painter(), picture, picture);
         }
         resize(pane, picture, ui.ctx().pixels_per_point());
-        if response.hovered() || response.dragged() || response.has_focus() {
+        // A mouse that rests does not take the keys from the pane that was chosen by one.
+        let is_pointed = response.hovered() && ui.input(|i| i.pointer.is_moving() || i.pointer.any_down());
+        if is_pointed || response.dragged() || response.has_focus() {
             self.active = index;
         }
         if self.active == index && self.panes.len() > 1 {

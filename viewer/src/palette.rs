@@ -49,6 +49,7 @@ impl Viewer {
         egui::Window::new("All actions")
             .collapsible(false)
             .resizable(false)
+            .fade_in(false)
             .anchor(Align2::CENTER_TOP, Vec2::new(0.0, 60.0))
             .show(ctx, |ui| {
                 ui.set_width(460.0);

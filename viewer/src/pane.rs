@@ -215,9 +215,10 @@ impl Pane {
         if other.is_empty() {
             return;
         }
-        let text = format!("{} of {} not as given", other.len(), scene.objects.len());
+        let text = format!("{}/{} changed", other.len(), scene.objects.len());
         ui.push_id(("decisions", number), |ui| {
             ui.menu_button(text, |ui| {
+                ui.strong("Not drawn as they were given:");
                 egui::ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
                     for (object, decision) in other {
                         ui.label(format!("{}: {}: {}", object.name, decision.word(), decision.why()));

@@ -48,7 +48,8 @@ impl Viewer {
 
     fn painter(&self, ctx: &Context) -> Painter {
         let wake = ctx.clone();
-        Painter::new(self.registry.clone(), self.converter.clone(), move || wake.request_repaint())
+        let crew = self.crew.clone();
+        Painter::new(self.registry.clone(), self.converter.clone(), crew, move || wake.request_repaint())
     }
 
     /// Has a pane drawn by another back end. What was set by meaning for the one before is taken along.

@@ -1,6 +1,7 @@
 //! What does a scripted session do? A line each, as in:
 //!
 //! ```text
+//! size 800x500        of the window
 //! do Wipe             an action by its name
 //! panes raster,voxel  the back ends of the panes
 //! open sponza.glb     a scene
@@ -27,6 +28,7 @@ const SPEED: f64 = 0.6;
 /// One thing to do.
 #[derive(Clone, Debug, PartialEq)]
 enum Step {
+    Size([f32; 2]),
     Do(Action),
     Panes(Vec<String>),
     Open(String),
@@ -43,8 +45,8 @@ enum Step {
 pub struct Script {
     steps: std::vec::IntoIter<Step>,
     running: Option<Running>,
-    /// When the window showed its first pictures in full.
-    begun: Option<Instant>,
+    /// When the program read it, until the first frame.
+    read: Option<Instant>,
 }
 
 #[derive(Debug)]
@@ -68,7 +70,7 @@ impl Script {
         let steps: Result<Vec<_>, _> = lines
             .map(|(i, line)| step(line).ok_or_else(|| format!("line {}: `{line}` is no step", i + 1)))
             .collect();
-        Ok(Self { steps: steps?.into_iter(), running: None, begun: None })
+        Ok(Self { steps: steps?.into_iter(), running: None, read: Some(Instant::now()) })
     }
 }
 
@@ -76,7 +78,13 @@ fn step(line: &str) -> Option<Step> {
     let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
     let rest = rest.trim();
     let seconds = || rest.parse().ok().and_then(|s: f64| Duration::try_from_secs_f64(s).ok());
+    let size = || {
+        let (width, height) = rest.split_once('x')?;
+        let edge = |text: &str| text.parse().ok().filter(|edge| (1.0..=16_384.0).contains(edge));
+        Some([edge(width)?, edge(height)?])
+    };
     Some(match word {
+        "size" => Step::Size(size()?),
         "do" => Step::Do(ACTIONS.iter().find(|entry| entry.name == rest)?.action),
         "panes" if !rest.is_empty() => Step::Panes(rest.split(',').map(|id| id.trim().to_owned()).collect()),
         "open" if !rest.is_empty() => Step::Open(rest.to_owned()),
@@ -100,7 +108,9 @@ impl Viewer {
     pub(crate) fn follow_script(&mut self, ctx: &Context) {
         let Some(mut script) = self.script.take() else { return };
         ctx.request_repaint();
-        script.begun.get_or_insert_with(Instant::now);
+        if let Some(read) = script.read.take() {
+            println!("first frame after {:.2} s", read.elapsed().as_secs_f64());
+        }
         let is_done = match &mut script.running {
             Some(running) => self.go_on(running, ctx),
             None => true,
@@ -119,6 +129,7 @@ impl Viewer {
 
     fn begin(&mut self, step: &Step, ctx: &Context) {
         match step {
+            Step::Size(size) => ctx.send_viewport_cmd(ViewportCommand::InnerSize((*size).into())),
             Step::Do(action) => self.perform(*action, ctx),
             Step::Panes(backends) => {
                 self.set_count(backends.len(), ctx);
@@ -171,7 +182,7 @@ impl Viewer {
                 running.count += 1;
                 running.count > 2 && self.is_at_rest()
             }
-            Step::Do(_) | Step::Panes(_) | Step::Bend(_) | Step::Quit => true,
+            Step::Size(_) | Step::Do(_) | Step::Panes(_) | Step::Bend(_) | Step::Quit => true,
         }
     }
 
@@ -184,7 +195,12 @@ impl Viewer {
                 println!("window's thread, with painting: {}", self.whole_frames);
                 println!("from stop to free: {}", self.stops());
                 for pane in &self.panes {
-                    println!("{}: {}", pane.backend, pane.status());
+                    println!(
+                        "{}: {}, from stop to free: {}",
+                        pane.backend,
+                        pane.status(),
+                        pane.painter.stops()
+                    );
                 }
             }
             Step::Switch(_) => {

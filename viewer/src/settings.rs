@@ -79,6 +79,7 @@ fn panel(ui: &mut egui::Ui, info: &BackendInfo, settings: &mut Settings) {
             groups.push(group(parameter));
         }
     }
+    let mut is_first = true;
     for name in groups {
         let members: Vec<_> = info.parameters.iter().filter(|p| group(p) == name).collect();
         let mut show = |ui: &mut egui::Ui| {
@@ -93,7 +94,8 @@ fn panel(ui: &mut egui::Ui, info: &BackendInfo, settings: &mut Settings) {
             }
         };
         if members.len() > 2 {
-            egui::CollapsingHeader::new(name).default_open(groups_are_few(info)).show(ui, show);
+            let is_open = groups_are_few(info) || std::mem::take(&mut is_first);
+            egui::CollapsingHeader::new(name).default_open(is_open).show(ui, show);
         } else {
             show(ui);
         }
@@ -125,7 +127,7 @@ fn control(ui: &mut egui::Ui, parameter: &Parameter, current: &Value, label: egu
         (ParameterKind::Int { min, max }, Value::Int(value)) => {
             let mut number = *value as f64;
             let range = min as f64..=max as f64;
-            let changed = field::number(ui, parameter.name, &mut number, &range, &unit);
+            let changed = field::number(ui, parameter.name, &mut number, &range, (&unit, 0));
             changed.then(|| (number.round() as i64).to_string())
         }
         (ParameterKind::Float { min, max }, Value::Float(_) | Value::Int(_)) => {
@@ -134,7 +136,8 @@ fn control(ui: &mut egui::Ui, parameter: &Parameter, current: &Value, label: egu
                 Value::Float(value) => *value,
                 Value::Bool(_) | Value::Text(_) => min,
             };
-            field::number(ui, parameter.name, &mut number, &(min..=max), &unit).then(|| number.to_string())
+            field::number(ui, parameter.name, &mut number, &(min..=max), (&unit, field::DECIMALS))
+                .then(|| number.to_string())
         }
         (ParameterKind::Choice { choices }, Value::Text(value)) => {
             let mut chosen = value.as_str();

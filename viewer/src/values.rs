@@ -14,18 +14,22 @@ impl Viewer {
                 ui.label("Point at a picture: here are the values of all panes at that place.");
                 return;
             };
-            egui::Grid::new("values of panes").striped(true).show(ui, |ui| {
-                for pane in &self.panes {
-                    ui.strong(&pane.backend);
-                    let Some(painting) = pane.painting() else { continue };
-                    let scene = &self.document.scene;
-                    for (channel, value) in probe::values(&painting.framebuffer, scene, place) {
-                        ui.label(format!("{} {value}", channel.name()));
+            let wide = egui::ScrollArea::horizontal().id_salt("values");
+            let grid = egui::Grid::new("values of panes").striped(true);
+            wide.show(ui, |ui| {
+                grid.show(ui, |ui| {
+                    for pane in &self.panes {
+                        ui.strong(&pane.backend);
+                        let Some(painting) = pane.painting() else { continue };
+                        let scene = &self.document.scene;
+                        for (channel, value) in probe::values(&painting.framebuffer, scene, place) {
+                            ui.label(format!("{} {value}", channel.name()));
+                        }
+                        let id = probe::id_at(&painting.framebuffer, place);
+                        ui.label(id.map_or(String::new(), |id| did(scene, &painting.decisions, id)));
+                        ui.end_row();
                     }
-                    let id = probe::id_at(&painting.framebuffer, place);
-                    ui.label(id.map_or(String::new(), |id| did(scene, &painting.decisions, id)));
-                    ui.end_row();
-                }
+                })
             });
         });
     }

@@ -12,6 +12,7 @@ use crate::live::Program;
 use crate::measure::Times;
 use crate::modes::Mode;
 use crate::navigation::Navigation;
+use crate::painter::Crew;
 use crate::palette::Palette;
 use crate::pane::Pane;
 use crate::scene_panel::Chosen;
@@ -45,6 +46,8 @@ pub struct Viewer {
     /// Why plugins are not among them.
     pub(crate) refused: Vec<String>,
     pub(crate) converter: Arc<Converter>,
+    /// The painters of all panes.
+    pub(crate) crew: Crew,
     pub(crate) document: Document,
     pub(crate) loading: Option<Errand<Scene>>,
     /// Whether what is being read takes the place of the same file, seen as before.
@@ -107,6 +110,7 @@ impl Viewer {
             registry,
             refused: Vec::new(),
             converter: Arc::default(),
+            crew: Crew::default(),
             document,
             loading: None,
             is_reloading: false,
@@ -180,6 +184,12 @@ impl Viewer {
     /// Chooses an object, as a click on it does.
     pub fn choose(&mut self, object: usize) {
         self.chosen = Some(Chosen::Object(object));
+    }
+
+    /// Tells whether there is a change to take back.
+    #[must_use]
+    pub fn can_undo(&self) -> bool {
+        self.document.can()[0]
     }
 
     /// Returns what was set for a back end.
@@ -265,7 +275,8 @@ impl Viewer {
 
         self.show_bar(ui);
         self.show_panels(ui);
-        egui::CentralPanel::no_frame().show(ui, |ui| {
+        let frame = egui::Frame::NONE.fill(ui.visuals().panel_fill);
+        egui::CentralPanel::no_frame().frame(frame).show(ui, |ui| {
             let rect = ui.available_rect_before_wrap();
             self.show_panes(ui, rect);
         });

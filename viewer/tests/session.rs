@@ -55,17 +55,17 @@ fn a_session_in_a_real_window() {
     let folder = std::env::temp_dir().join(format!("polyptych-session-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let shot = |name: &str| folder.join(format!("{name}.png"));
-    let mut script = String::from("wait\n");
+    let mut script = String::from("size 640x400\npanes raster,voxel\n");
     let mut add = |line: String| script += &(line + "\n");
     let take = |name: &str| format!("wait\nshot {}", shot(name).display());
     add(take("first"));
-    add("orbit 2".to_owned());
+    add("orbit 1".to_owned());
     add(take("turned"));
     for number in 1..=5 {
         add(format!("do Back end {number}"));
         add(take(&format!("backend{number}")));
     }
-    add("panes freeform,reference\nbend 6".to_owned());
+    add("panes freeform\nbend 6".to_owned());
     add(take("bent"));
     add("do Undo".to_owned());
     add(take("unbent"));

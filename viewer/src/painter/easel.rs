@@ -1,11 +1,11 @@
 //! How is an order drawn? Coarse where it would take long, then in full; or as fine as a time allows.
 
+use super::crew::{Crew, Hands};
 use super::tiles::Tiles;
 use super::{BUDGET, Desk, News, Order, Pace, Painting};
 use eframe::egui::ColorImage;
 use polyptych::convert::Converter;
 use polyptych::framebuffer::{Channel, Channels, Framebuffer, Pixel};
-use polyptych::parallel::Pool;
 use polyptych::picture::displayed;
 use polyptych::seam::{Control, Prepared, Registry, RenderError, Renderer, Report};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,8 +21,7 @@ const SHOWN_IN_PARTS: Duration = Duration::from_millis(120);
 /// What a painter works with.
 pub(super) struct Easel {
     registry: Registry,
-    /// Threads of its own: a slow pane must not keep those of a fast one.
-    pool: Pool,
+    hands: Hands,
     converter: Arc<Converter>,
     renderer: Option<(String, Box<dyn Renderer>)>,
     /// Seconds a pixel of the last frame.
@@ -30,8 +29,8 @@ pub(super) struct Easel {
 }
 
 impl Easel {
-    pub(super) fn new(registry: Registry, converter: Arc<Converter>) -> Result<Self, String> {
-        Ok(Self { registry, pool: Pool::new(0)?, converter, renderer: None, cost: None })
+    pub(super) fn new(registry: Registry, converter: Arc<Converter>, crew: Crew) -> Self {
+        Self { registry, hands: Hands::of(crew), converter, renderer: None, cost: None }
     }
 
     /// Draws an order. A renderer that fails or panics is thrown away.
@@ -43,7 +42,7 @@ impl Easel {
             Err(_) => "it panicked; the next picture begins anew".to_owned(),
         };
         self.renderer = None;
-        desk.tell(Some(stop), News::Failure(format!("{}: {why}", order.backend)));
+        desk.tell(stop, News::Failure(format!("{}: {why}", order.backend)));
     }
 
     fn try_paint(&mut self, order: &Order, stop: &AtomicBool, desk: &Desk) -> Result<(), RenderError> {
@@ -92,7 +91,7 @@ impl Easel {
                 bytes: prepared.bytes,
                 decisions,
             };
-            desk.tell(Some(stop), News::Painting(painting));
+            desk.tell(stop, News::Painting(painting));
             if is_full {
                 return Ok(());
             }
@@ -102,8 +101,11 @@ impl Easel {
 
     fn prepare(&mut self, order: &Order, stop: &AtomicBool) -> Result<Prepared, RenderError> {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
-        let control = Control::new(&self.pool).cancelled_by(stop);
-        self.pool.install(|| renderer.prepare(&order.scene, &order.need, &self.converter, &control))
+        let converter = &self.converter;
+        self.hands.lend(|threads| {
+            let control = Control::new(threads).cancelled_by(stop);
+            renderer.prepare(&order.scene, &order.need, converter, &control)
+        })
     }
 
     /// Draws a picture, and learns from it how long one takes.
@@ -115,14 +117,16 @@ impl Easel {
         stop: &AtomicBool,
     ) -> Result<(Report, Duration), RenderError> {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
-        let control = Control::new(&self.pool).cancelled_by(stop);
-        let control = match tiles {
-            Some(tiles) => control.watched_by(tiles),
-            None => control,
-        };
         let pixels = f64::from(target.width()) * f64::from(target.height());
         let begin = Instant::now();
-        let report = self.pool.install(|| renderer.render(&order.need.frame(), target, &control))?;
+        let report = self.hands.lend(|threads| {
+            let control = Control::new(threads).cancelled_by(stop);
+            let control = match tiles {
+                Some(tiles) => control.watched_by(tiles),
+                None => control,
+            };
+            renderer.render(&order.need.frame(), target, &control)
+        })?;
         let frame = begin.elapsed();
         self.cost = Some(frame.as_secs_f64() / pixels.max(1.0));
         Ok((report, frame))

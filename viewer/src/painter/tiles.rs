@@ -41,7 +41,7 @@ impl Watcher for Tiles<'_> {
         }
         if shown.elapsed() > LOOK {
             *shown = Instant::now();
-            self.desk.tell(Some(self.stop), News::Parts(image.clone()));
+            self.desk.tell(self.stop, News::Parts(image.clone()));
         }
     }
 }

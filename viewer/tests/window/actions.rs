@@ -1,8 +1,9 @@
 //! Can everything be done from the palette and by keys?
 
 use crate::harness::{press, rest, window};
-use eframe::egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable;
+use eframe::egui::accesskit::Role;
+use eframe::egui::{Key, Modifiers, Vec2};
+use egui_kittest::kittest::{NodeT, Queryable};
 use polyptych_viewer::{ACTIONS, Action, Mode};
 
 #[test]
@@ -81,4 +82,46 @@ fn the_first_screen_says_how_and_goes() {
     harness.get_by_label("Begin").click();
     rest(&mut harness);
     assert!(harness.query_by_label_contains("Drop a model onto this window").is_none());
+}
+
+#[test]
+fn every_control_has_a_name_for_screen_readers() {
+    let mut harness = window("quadrics");
+    let ctx = harness.ctx.clone();
+    harness.set_size(Vec2::new(1200.0, 1600.0));
+    harness.state_mut().choose(0);
+    for action in [
+        Action::RemovePane,
+        Action::Objects,
+        Action::Settings,
+        Action::Values,
+        Action::Move,
+        Action::Backend(4),
+    ] {
+        harness.state_mut().perform(action, &ctx);
+    }
+    rest(&mut harness);
+    let mut count = 0;
+    let mut nameless = Vec::new();
+    for node in harness.root().children_recursive() {
+        let node = node.accesskit_node();
+        let is_control = matches!(
+            node.role(),
+            Role::Button
+                | Role::CheckBox
+                | Role::ComboBox
+                | Role::SpinButton
+                | Role::Slider
+                | Role::TextInput
+                | Role::ColorWell
+        );
+        if is_control {
+            count += 1;
+            if node.label().is_none_or(|label| label.trim().is_empty()) {
+                nameless.push(format!("{:?} {:?}", node.role(), node.value()));
+            }
+        }
+    }
+    assert!(count > 60, "{count} controls");
+    assert_eq!(nameless, [""; 0], "of {count}");
 }

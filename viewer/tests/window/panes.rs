@@ -2,12 +2,12 @@
 
 use crate::harness::{colors, drag, press, rest, window};
 use eframe::egui::accesskit::Role;
-use eframe::egui::{Key, Pos2};
+use eframe::egui::{Key, Pos2, Vec2};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use polyptych::BuiltinBackends;
 use polyptych::seam::Registry;
-use polyptych_viewer::{Mode, Viewer};
+use polyptych_viewer::{Action, Mode, Viewer};
 
 #[test]
 fn two_back_ends_stand_side_by_side_at_once() {
@@ -145,4 +145,57 @@ fn modes_and_panes_follow_the_bar() {
     rest(&mut harness);
     assert_eq!(harness.state().shown().count(), 4);
     assert!((0..4).all(|pane| colors(&harness, pane) > 20));
+}
+
+#[test]
+fn choosing_a_style_shows_its_numbers() {
+    let mut harness = window("polyhedra");
+    drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
+    press(&mut harness, Key::Num5);
+    assert_eq!(harness.state().shown().next(), Some("stylized"));
+    press(&mut harness, Key::I);
+    harness.set_size(Vec2::new(640.0, 1500.0));
+    rest(&mut harness);
+    let before = harness.state().picture(0).unwrap().0;
+    harness.get_by_label("toon").click();
+    rest(&mut harness);
+    assert_ne!(harness.state().picture(0).unwrap().0, before, "another style");
+    let style = polyptych::stylized::Preset::builtin("toon").unwrap();
+    let steps = style.settings["tone.steps"].to_string();
+    let field = harness.get_by_role_and_label(Role::SpinButton, "tone.steps");
+    assert_eq!(field.accesskit_node().numeric_value().map(|n| n.to_string()), Some(steps));
+}
+
+#[test]
+fn equal_time_draws_what_fits_and_the_chart_grows() {
+    let mut harness = window("polyhedra");
+    let ctx = harness.ctx.clone();
+    harness.state_mut().perform(Action::EqualTime, &ctx);
+    rest(&mut harness);
+    assert!(colors(&harness, 0) > 20 && colors(&harness, 1) > 20);
+    harness.state_mut().perform(Action::EqualTime, &ctx);
+    harness.state_mut().perform(Action::EqualError, &ctx);
+    rest(&mut harness);
+    assert_eq!(harness.state().is_on(Action::EqualError), Some(true));
+    harness.state_mut().perform(Action::EqualError, &ctx);
+    harness.state_mut().perform(Action::Chart, &ctx);
+    rest(&mut harness);
+    assert!(harness.query_by_label_contains("2 pictures, the newest large").is_some());
+}
+
+#[test]
+fn a_program_changes_the_scene_while_it_is_shown() {
+    let mut harness = window("polyhedra");
+    let before = harness.state().picture(0).unwrap().0;
+    harness.state_mut().run(|scene, _, input| {
+        if input.key_pressed(Key::Backspace) {
+            scene.objects.pop();
+        }
+    });
+    let count = harness.state().scene().objects.len();
+    rest(&mut harness);
+    assert_eq!(harness.state().picture(0).unwrap().0, before, "who only reads changes nothing");
+    press(&mut harness, Key::Backspace);
+    assert_eq!(harness.state().scene().objects.len(), count - 1);
+    assert_ne!(harness.state().picture(0).unwrap().0, before);
 }
