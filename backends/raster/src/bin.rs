@@ -4,11 +4,11 @@
 //! and sorted into tiles by one thread, so bins hold the same records in the same order on any number of them.
 
 use crate::clip::clip;
+use crate::grid::{Placed, TileGrid};
 use crate::lens::{Lens, ScreenFromObject};
 use crate::model::{Class, Model, Part, Role};
 use crate::setup::{Corners, DepthPlane, Record, STEPS};
 use crate::sieve;
-use crate::tile::{Placed, TileGrid};
 use crate::transform::{PartOnScreen, ScreenVertices, border};
 use polyptych_core::lanes::LANES;
 use polyptych_core::parallel::{Threads, for_each_mut};

@@ -1,11 +1,11 @@
 //! How do lines get onto the picture: edges tile by tile, and those at which bodies cross when all tiles are done?
 
 use crate::crossings::Seen;
+use crate::grid::{TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileArea};
 use crate::light::Illumination;
 use crate::lines::Lines;
 use crate::paint::{Painter, Scratch};
 use crate::strokes::Strokes;
-use crate::tile::{TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileArea};
 use glam::Vec3;
 use polyptych_core::framebuffer::{Band, Channel, Framebuffer};
 use polyptych_core::seam::Control;

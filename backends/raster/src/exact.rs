@@ -7,11 +7,11 @@
 //! listed and triangles drawn over them; listing triangles is ours, and serves until the light or a caster moves.
 
 use crate::bin::Bins;
+use crate::grid::{TILE_HEIGHT, TILE_WIDTH, TileGrid};
 use crate::lens::{Lens, cube_face};
 use crate::lookup::{Blocker, Sight, Sights};
 use crate::model::Model;
 use crate::shadow::Shadows;
-use crate::tile::{TILE_HEIGHT, TILE_WIDTH, TileGrid};
 use glam::DVec3;
 use polyptych_core::lanes::{LANES, Mask8};
 use polyptych_core::scene::Scene;

@@ -3,6 +3,7 @@
 use crate::bin::{Bins, Pass};
 use crate::drawing::Drawing;
 use crate::faces::{Faces, face_lens, needed};
+use crate::grid::TileGrid;
 use crate::info::Mode;
 use crate::lens::Lens;
 use crate::light::Illumination;
@@ -11,7 +12,6 @@ use crate::paint::{self, Announce, Look, Painter};
 use crate::ready::Ready;
 use crate::shadow::{Before, Shadows};
 use crate::strokes::Strokes;
-use crate::tile::TileGrid;
 use crate::transform::{ScreenVertices, transform};
 use polyptych_core::camera::Camera;
 use polyptych_core::framebuffer::Framebuffer;

@@ -2,8 +2,10 @@
 //!
 //! All fragments of a tile are kept and sorted, so any number of layers is right whatever the order of triangles.
 
+use crate::edges::Spans;
+use crate::grid::TileArea;
 use crate::setup::Record;
-use crate::tile::{Spans, TileArea, TileBuffer};
+use crate::tile::TileBuffer;
 
 /// A triangle on a pixel. The order of the fields is the order of drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -11,7 +11,9 @@
 //!  sieve      eight triangles at once: which of them cover no pixel
 //!  setup      corners snapped to 24.8 bits, exact edges, depth plane
 //!  bin        records sorted into tiles of 64x32 pixels
-//!  tile       spans of covered pixels; nearest triangle of each: the visibility buffer
+//!  grid       which tiles something touches
+//!  edges      which pixels of a tile a triangle covers
+//!  tile       the nearest triangle of each pixel: the visibility buffer
 //!  layers     fragments of see-through triangles, sorted per pixel
 //!  face       a visible triangle set up once a tile: where rays meet it, normals, texture with its mip level
 //!  octet      the same in lanes for pixels that show a triangle each
@@ -23,6 +25,7 @@
 //!  exact      the same by all triangles on the way
 //!  smooth     edges: triangles that share a pixel, by several places in it
 //!  paint      the steps of a tile, and the pixel's channels
+//!  surfaces   samples into batches, and batches into pixels
 //!  lines      edges of faces, and free segments                   (prepare, for modes that draw them)
 //!  strokes    lines on the picture: which of their pixels nothing hides
 //!  crossings  where bodies cross, from the triangles of neighboring pixels
@@ -49,11 +52,13 @@ mod conversion;
 mod crossings;
 mod decide;
 mod drawing;
+mod edges;
 mod exact;
 mod face;
 mod faces;
 mod frame;
 mod gouraud;
+mod grid;
 mod info;
 mod layers;
 mod lens;
@@ -72,6 +77,7 @@ mod shadow;
 mod sieve;
 mod smooth;
 mod strokes;
+mod surfaces;
 #[cfg(test)]
 mod tests;
 mod tile;

@@ -15,10 +15,11 @@
 //! no triangle but their own.
 
 use crate::face::{Face, Place};
+use crate::grid::{TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH};
 use crate::lens::{Lens, cube_face};
 use crate::model::{Class, Model, Role};
 use crate::shadow::{MapFace, Shadows, looking};
-use crate::tile::{NO_TRIANGLE, TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH};
+use crate::tile::NO_TRIANGLE;
 use glam::DVec3;
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 use polyptych_core::scene::Scene;

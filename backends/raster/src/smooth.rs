@@ -9,10 +9,12 @@
 
 use crate::batch::Batch;
 use crate::bin::Bins;
+use crate::grid::{TILE_PIXELS, TILE_WIDTH, TileArea};
 use crate::layers::{Fragment, collect, sort};
-use crate::paint::{LAYER, OPAQUE, Painter, Scratch, finite};
+use crate::paint::{OPAQUE, Painter, Scratch};
 use crate::setup::STEPS;
-use crate::tile::{NO_TRIANGLE, TILE_PIXELS, TILE_WIDTH, TileArea, TileBuffer};
+use crate::surfaces::{LAYER, finite};
+use crate::tile::{NO_TRIANGLE, TileBuffer};
 use glam::Vec3;
 use polyptych_core::framebuffer::Band;
 

@@ -7,10 +7,11 @@
 
 use crate::bin::{Bin, RUNS, run_of, runs_for};
 use crate::face::Faces;
+use crate::grid::{Placed, TILE_PIXELS, TILE_WIDTH, TileArea, TileGrid};
 use crate::lens::{GUARD, Homogeneous, Lens};
 use crate::lines::{Edge, Lines};
 use crate::model::{Model, Part};
-use crate::tile::{NO_TRIANGLE, Placed, TILE_PIXELS, TILE_WIDTH, TileArea, TileGrid};
+use crate::tile::NO_TRIANGLE;
 use crate::transform::{PartOnScreen, ScreenVertices, border};
 use glam::DVec2;
 use polyptych_core::parallel::{Threads, for_each_mut};

@@ -1,8 +1,9 @@
 //! Is every pixel inside of a surface covered exactly once?
 
 use super::{Random, camera, draw, scene_of, triangle};
+use crate::edges::Spans;
+use crate::grid::{TILE_WIDTH, TileGrid};
 use crate::setup::{Corners, DepthPlane, Record, ScreenPoint};
-use crate::tile::{Spans, TILE_WIDTH, TileGrid};
 use glam::Vec3;
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::scene::{Mesh, Shape};
