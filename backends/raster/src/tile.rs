@@ -193,7 +193,7 @@ impl TileBuffer {
     }
 
     /// Draws eight pixels of a triangle where they are not outside of it, and nearer than what is there. `apart` is
-    /// zero; see [`TileBuffer::of_here`].
+    /// zero; see [`TileBuffer::fill`].
     #[inline(always)]
     fn draw_block<const TIES: bool>(
         &mut self,
