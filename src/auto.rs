@@ -4,7 +4,8 @@
 //! candidate draws two small pictures of it first: their times tell what a pixel costs and what the rest does, their
 //! difference to the reference's how right it is. What is converted for them has the tolerance of the large picture, so
 //! that it is found in the cache when that is drawn. Where even that takes next to no time, or comes near to what is
-//! asked, it is drawn and measured itself, and held against the reference's where that is drawn in about a second. Those between which it is close then draw by turns: what else the machine does
+//! asked, it is drawn and measured itself, and held against the reference's where that is drawn in about a second.
+//! Those between which it is close then draw by turns: what else the machine does
 //! slows all of them.
 
 mod pilot;

@@ -21,11 +21,17 @@ use std::sync::Mutex;
 /// Buffers that live from frame to frame.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    pub(crate) vertices: Vec<ScreenVertices>,
-    pub(crate) bins: Bins,
-    pub(crate) strokes: Strokes,
-    pub(crate) bands: Vec<Mutex<paint::Scratch>>,
-    pub(crate) faces: Faces,
+    pub(crate) pipeline: Pipeline,
+    faces: Faces,
+}
+
+/// The buffers of one straight-line picture.
+#[derive(Default)]
+pub(crate) struct Pipeline {
+    vertices: Vec<ScreenVertices>,
+    bins: Bins,
+    strokes: Strokes,
+    bands: Vec<Mutex<paint::Scratch>>,
 }
 
 /// What a frame took.
@@ -36,27 +42,6 @@ pub(crate) struct Work {
 }
 
 impl Scratch {
-    /// Draws a picture: vertices, bins, tiles.
-    pub(crate) fn draw(
-        &mut self,
-        ready: &Ready,
-        lens: &Lens,
-        target: &mut Framebuffer,
-        announce: Announce,
-        work: &mut Work,
-        control: &Control<'_>,
-    ) -> Result<(), Cancelled> {
-        draw(
-            ready,
-            lens,
-            target,
-            announce,
-            work,
-            control,
-            (&mut self.vertices, &mut self.bins, &mut self.strokes, &mut self.bands),
-        )
-    }
-
     /// Draws the faces of a cube and looks the picture up in them.
     pub(crate) fn draw_bent(
         &mut self,
@@ -72,9 +57,7 @@ impl Scratch {
         let needed = needed(camera, width, height, control.threads);
         for face in (0..6).filter(|face| needed >> face & 1 == 1) {
             let lens = face_lens(camera, face, edge, ready.near(camera)).with_depths_of(&ready.model.bounds);
-            let buffers = (&mut self.vertices, &mut self.bins, &mut self.strokes, &mut self.bands);
-            let picture = self.faces.picture(face);
-            draw(ready, &lens, picture, Announce::No, work, control, buffers)?;
+            self.pipeline.draw(ready, &lens, self.faces.picture(face), Announce::No, work, control)?;
         }
         self.faces.resample(camera, &ready.scene.environment.background, target, control.threads);
         control.finished(&target.band());
@@ -88,63 +71,64 @@ impl Scratch {
         old: Option<Before>,
         control: &Control<'_>,
     ) -> Result<Shadows, Cancelled> {
-        let (vertices, bins) = (&mut self.vertices, &mut self.bins);
+        let Pipeline { vertices, bins, .. } = &mut self.pipeline;
         let of = (&*ready.scene, &*ready.model);
         Shadows::build(of, &ready.lamps, ready.sizes, old, vertices, bins, control)
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        let bands: usize = self.bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
-        (self.vertices.capacity() * size_of::<ScreenVertices>() + bands) as u64
-            + self.bins.bytes()
-            + self.strokes.bytes()
+        let Pipeline { vertices, bins, strokes, bands } = &self.pipeline;
+        let bands: usize = bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
+        (vertices.capacity() * size_of::<ScreenVertices>() + bands) as u64
+            + bins.bytes()
+            + strokes.bytes()
             + self.faces.bytes()
     }
 }
 
-type Buffers<'a> =
-    (&'a mut Vec<ScreenVertices>, &'a mut Bins, &'a mut Strokes, &'a mut Vec<Mutex<paint::Scratch>>);
-
-/// The pipeline.
-fn draw(
-    ready: &Ready,
-    lens: &Lens,
-    target: &mut Framebuffer,
-    announce: Announce,
-    work: &mut Work,
-    control: &Control<'_>,
-    (vertices, bins, strokes, bands): Buffers<'_>,
-) -> Result<(), Cancelled> {
-    control.check()?;
-    let culls_back = ready.options.culls_back;
-    let smooth = ready.places.len() > 1;
-    let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, smooth, without: None };
-    // 1. Where on the picture is every vertex?
-    transform(&ready.model, lens, vertices, control.threads);
-    work.phases.end("transform");
-    // 2. Clip, set up, and sort the triangles into tiles.
-    bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height).smooth(smooth), control.threads);
-    work.triangles += bins.triangles();
-    let drawing = ready.lines.as_deref().map(|lines| {
-        let hides = ready.options.mode == Mode::HiddenLine;
-        strokes.fill(lines, &ready.model, lens, vertices, (culls_back, hides), control.threads);
-        Drawing { lines, strokes, hides }
-    });
-    work.phases.end("bin");
-    // 3. Draw tile by tile: visibility, layers, surfaces and light.
-    let light = Illumination {
-        scene: &ready.scene,
-        model: &ready.model,
-        lamps: &ready.lamps,
-        shadows: ready.shadows.as_deref(),
-        lighting: ready.options.lighting.unwrap_or(ready.scene.environment.lighting),
-    };
-    let look = Look { shading: ready.options.shading, places: &ready.places, drawing };
-    let painter = Painter::new(light, look, lens, bins, target.channels());
-    work.shaded += painter.paint(target, bands, announce, control)?;
-    if painter.paint_crossings(target, control) && announce == Announce::Yes {
-        control.finished(&target.band());
+impl Pipeline {
+    /// Draws a picture.
+    pub(crate) fn draw(
+        &mut self,
+        ready: &Ready,
+        lens: &Lens,
+        target: &mut Framebuffer,
+        announce: Announce,
+        work: &mut Work,
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
+        let Self { vertices, bins, strokes, bands } = self;
+        control.check()?;
+        let culls_back = ready.options.culls_back;
+        let smooth = ready.places.len() > 1;
+        let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, smooth, without: None };
+        // 1. Where on the picture is every vertex?
+        transform(&ready.model, lens, vertices, control.threads);
+        work.phases.end("transform");
+        // 2. Clip, set up, and sort the triangles into tiles.
+        bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height).smooth(smooth), control.threads);
+        work.triangles += bins.triangles();
+        let drawing = ready.lines.as_deref().map(|lines| {
+            let hides = ready.options.mode == Mode::HiddenLine;
+            strokes.fill(lines, &ready.model, lens, vertices, (culls_back, hides), control.threads);
+            Drawing { lines, strokes, hides }
+        });
+        work.phases.end("bin");
+        // 3. Draw tile by tile: visibility, layers, surfaces and light.
+        let light = Illumination {
+            scene: &ready.scene,
+            model: &ready.model,
+            lamps: &ready.lamps,
+            shadows: ready.shadows.as_deref(),
+            lighting: ready.options.lighting.unwrap_or(ready.scene.environment.lighting),
+        };
+        let look = Look { shading: ready.options.shading, places: &ready.places, drawing };
+        let painter = Painter::new(light, look, lens, bins, target.channels());
+        work.shaded += painter.paint(target, bands, announce, control)?;
+        if painter.paint_crossings(target, control) && announce == Announce::Yes {
+            control.finished(&target.band());
+        }
+        work.phases.end("draw");
+        Ok(())
     }
-    work.phases.end("draw");
-    Ok(())
 }

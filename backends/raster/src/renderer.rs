@@ -264,7 +264,7 @@ impl Renderer for Raster {
         let mut work = Work { phases: Phases::start(), triangles: 0, shaded: 0 };
         let near = ready.near(&frame.camera);
         match Lens::of_camera(&frame.camera, width, height, near) {
-            Some(lens) => self.scratch.draw(
+            Some(lens) => self.scratch.pipeline.draw(
                 ready,
                 &lens.with_depths_of(&ready.model.bounds),
                 target,

@@ -49,11 +49,13 @@ fn medley() -> Scene {
 #[test]
 fn pictures_do_not_depend_on_the_width_of_registers() {
     let scene = medley();
-    let sights: [&[(&str, &str)]; 4] = [
+    let sights: [&[(&str, &str)]; 6] = [
         &[],
         &[("shading", "gouraud")],
         &[("shading", "flat"), ("samples", "4")],
         &[("mode", "hidden-line")],
+        &[("shadow.tier", "exact")],
+        &[("shadow.tier", "plain")],
     ];
     for settings in sights {
         let draw = |plain: bool| {
