@@ -7,7 +7,7 @@ use crate::lens::{Lens, OnRays, Rays};
 use crate::model::Part;
 use glam::{Vec2, Vec3};
 use polyptych_core::lanes::{F32x8, F64x8};
-use polyptych_core::scene::{Mapping, Material, Scene, Texture};
+use polyptych_core::scene::{Mapping, Material, NormalMap, Scene, Texture};
 
 /// How the weights of the second and third corner change over one pixel to the right, and over one down.
 #[derive(Clone, Copy)]
@@ -77,6 +77,20 @@ impl Spot<'_> {
         let [v, w] = self.weights;
         let tinted = self.part.tinted(base, self.triangle, [v as f32, w as f32]);
         (tinted, material.effective_opacity(opacity).min(1.0))
+    }
+
+    /// Returns a unit shading normal as a normal map turns it. Both normals are on the viewer's side.
+    #[inline(never)]
+    pub(crate) fn turned(&self, map: &NormalMap, normal: Vec3, true_normal: Vec3) -> Vec3 {
+        let (part, mesh) = (self.part, self.part.mesh());
+        let Some(texture) = self.scene.textures.get(map.texture) else { return normal };
+        let Some(along) = mesh.along_uv(self.triangle) else { return normal };
+        let along = along.map(|v| (part.world_from_object.matrix3 * v.as_dvec3()).as_vec3());
+        let [a, b, c] = mesh.corners(self.triangle);
+        let outside = part.world_from_normal * (b - a).cross(c - a);
+        let side = if outside.dot(true_normal) < 0.0 { -1.0 } else { 1.0 };
+        let (uv, lod) = self.uv(texture);
+        map.turned(normal * side, along, texture.sample_here(uv.to_array(), lod).truncate()) * side
     }
 
     /// Returns the texture coordinates and the mip level.
