@@ -80,7 +80,7 @@ impl Spot<'_> {
     }
 
     /// Returns a unit shading normal as a normal map turns it. Both normals are on the viewer's side.
-    #[inline(never)]
+    #[inline(always)]
     pub(crate) fn turned(&self, map: &NormalMap, normal: Vec3, true_normal: Vec3) -> Vec3 {
         let (part, mesh) = (self.part, self.part.mesh());
         let Some(texture) = self.scene.textures.get(map.texture) else { return normal };

@@ -64,7 +64,7 @@ impl NormalMap {
     /// the triangle, not to its corners. A normal that comes out as nothing, or of directions that are none, is the given
     /// one.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn turned(&self, normal: Vec3, along: [Vec3; 2], texel: Vec3) -> Vec3 {
         let right = along[0] - normal * normal.dot(along[0]);
         let right = right / right.length();

@@ -49,6 +49,7 @@ impl Mesh {
 
     /// Returns the corner positions of a triangle.
     #[must_use]
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|i| self.positions[i as usize])
     }
@@ -56,7 +57,7 @@ impl Mesh {
     /// Returns how a place moves with u and with v on a triangle, in object space, up to a factor that both share;
     /// nothing where there are no texture coordinates or all three are on a line.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn along_uv(&self, triangle: usize) -> Option<[Vec3; 2]> {
         if self.uvs.is_empty() {
             return None;
