@@ -94,7 +94,7 @@ pub(crate) fn decision(
     converted: Option<(f64, String)>,
     mut losses: Vec<String>,
 ) -> Decision {
-    let exact_faces = matches!(*object.shape, Shape::Primitive(_) | Shape::Voxels(_));
+    let exact_faces = matches!(*object.shape, Shape::Primitive(_) | Shape::Voxels(_) | Shape::Mesh(_));
     let converted = match (converted, &*object.shape) {
         (Some((_, why)), Shape::Volume(_)) => {
             losses.insert(0, why);

@@ -17,6 +17,8 @@ pub(crate) struct Options {
     /// Nothing for that of the scene.
     pub(crate) lighting: Option<LightingModel>,
     pub(crate) culls_back: bool,
+    /// Whether meshes are drawn with no more triangles than the tolerance asks for.
+    pub(crate) spares_triangles: bool,
 }
 
 /// What a picture shows of surfaces.
@@ -89,6 +91,7 @@ impl Options {
             shading: named(&SHADINGS, settings.text(declared, "shading")),
             lighting: named(&LIGHTINGS, settings.text(declared, "lighting")),
             culls_back: settings.text(declared, "cull") == "back",
+            spares_triangles: settings.text(declared, "triangles") == "needed",
         }
     }
 }
@@ -163,6 +166,12 @@ pub(crate) fn info() -> BackendInfo {
                 "cull",
                 &["none", "back"],
                 "Which sides of triangles are left out; none is right for open meshes",
+            ),
+            choice(
+                "triangles",
+                &["all", "needed"],
+                "Whether meshes are drawn as given, or with as few triangles as stay within the tolerance: that takes a \
+                 second a million once, and pays for itself where many frames are drawn",
             ),
         ],
     }

@@ -48,12 +48,11 @@ pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
     let bends = is_resampled(&need.camera.projection);
     let forecasts = Converter::default();
     let (mut amount, mut known) = (Amount::default(), HashSet::new());
-    let draws_lines = options.mode.draws_lines();
     let objects: Vec<ObjectPlan> = scene
         .objects
         .iter()
         .map(|object| {
-            let mut plan = plan_object(&forecasts, scene, object, need, draws_lines, &mut amount);
+            let mut plan = plan_object(&forecasts, scene, object, need, options, &mut amount);
             // Objects of one shape and size share its triangles.
             let size = object.world_from_object.matrix3.to_cols_array().map(f64::to_bits);
             if !known.insert((Arc::as_ptr(&object.shape), detail(object, need).class(object), size)) {
@@ -110,7 +109,7 @@ fn plan_object(
     scene: &Scene,
     object: &Object,
     need: &Need,
-    draws_lines: bool,
+    options: Options,
     amount: &mut Amount,
 ) -> ObjectPlan {
     let mut plan = ObjectPlan {
@@ -120,6 +119,7 @@ fn plan_object(
         builds: String::new(),
         bytes: 0,
     };
+    let draws_lines = options.mode.draws_lines();
     if let Some(why) = why_skipped(object, draws_lines) {
         plan.decision = Decision::Skipped { why };
         return plan;
@@ -128,6 +128,12 @@ fn plan_object(
     if let Shape::Mesh(mesh) = &*object.shape {
         amount.vertices += mesh.positions.len() as f64;
         amount.triangles += mesh.triangles.len() as f64;
+        if options.spares_triangles {
+            // How many are left is known when they are found.
+            plan.builds = format!("at most {} triangles", mesh.triangles.len());
+            plan.bytes = mesh.bytes();
+            converted = Some((detail(object, need).tolerance, plan.builds.clone()));
+        }
     } else {
         let forecast = forecasts.mesh_forecast(scene, object, detail(object, need));
         amount.vertices += forecast.vertices as f64;

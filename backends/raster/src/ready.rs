@@ -116,7 +116,7 @@ impl Ready {
         for part in &self.model.parts {
             let object = &mut scene.objects[part.object];
             let Source::Converted(model) = &part.source else { continue };
-            let true_faces = matches!(*object.shape, Shape::Primitive(_) | Shape::Voxels(_));
+            let true_faces = matches!(*object.shape, Shape::Primitive(_) | Shape::Voxels(_) | Shape::Mesh(_));
             if !(true_faces && model.bound == 0.0) {
                 object.shape = Arc::new(Shape::Mesh(model.mesh.clone()));
                 changed = true;

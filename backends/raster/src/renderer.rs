@@ -91,7 +91,8 @@ impl Raster {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<(Arc<Model>, Arc<[Decision]>), RenderError> {
-        let draws_lines = Options::of(need, &self.info).mode.draws_lines();
+        let options = Options::of(need, &self.info);
+        let draws_lines = options.mode.draws_lines();
         let (mut sources, mut used) = (Vec::with_capacity(scene.objects.len()), Vec::new());
         for object in &scene.objects {
             control.check()?;
@@ -100,7 +101,7 @@ impl Raster {
                     return Err(RenderError::Required { object: object.name.clone(), reason });
                 }
                 sources.push(Err(reason));
-            } else if let Shape::Mesh(_) = &*object.shape {
+            } else if let (Shape::Mesh(_), false) = (&*object.shape, options.spares_triangles) {
                 sources.push(Ok(Source::Given(object.shape.clone())));
             } else {
                 let conversion = self.convert(scene, object, need, converter, control)?;
@@ -151,7 +152,7 @@ impl Raster {
         let model = match self.converted.iter().find(wanted) {
             Some(kept) => kept.model.clone(),
             None => converter
-                .mesh(scene, object, detail, control.threads)
+                .level(scene, object, detail, control.threads)
                 .map_err(|e| RenderError::Failed(e.to_string()))?,
         };
         Ok(Conversion::new(scene, object, detail, model))

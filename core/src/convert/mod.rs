@@ -10,6 +10,7 @@ mod chunks;
 mod distance;
 mod field_mesh;
 mod height_mesh;
+mod levels;
 mod palette;
 mod primitive_mesh;
 mod voxel_mesh;
@@ -25,6 +26,7 @@ use std::sync::Arc;
 #[derive(Default)]
 pub struct Converter {
     meshes: Cache<MeshModel>,
+    levels: Cache<MeshModel>,
     voxels: Cache<VoxelModel>,
     distances: Cache<DistanceModel>,
 }
@@ -221,6 +223,27 @@ impl Converter {
                 }
             };
             Ok(MeshModel { mesh, bound: bound * scale, why })
+        })
+    }
+
+    /// Returns a mesh with as few triangles as stay within the tolerance; other shapes as [`Converter::mesh`] does, which
+    /// makes no more than are needed.
+    ///
+    /// # Errors
+    /// When the shape has no surface at all.
+    pub fn level(
+        &self,
+        scene: &Scene,
+        object: &Object,
+        detail: Detail,
+        threads: &dyn Threads,
+    ) -> Result<Arc<MeshModel>, ConvertError> {
+        let Shape::Mesh(mesh) = &*object.shape else { return self.mesh(scene, object, detail, threads) };
+        let scale = scale_of(object);
+        self.levels.get(scene, object, detail, |tolerance| {
+            let (fewer, bound) = levels::simplified(mesh, tolerance, threads);
+            let why = format!("{} of {} triangles", fewer.triangles.len(), mesh.triangles.len());
+            Ok(MeshModel { mesh: fewer, bound: bound * scale, why })
         })
     }
 

@@ -7,7 +7,7 @@ use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::parallel::{OneThread, Pool, Threads};
-use polyptych_core::scene::{Light, Material, Primitive, Scene, Shape, Voxels};
+use polyptych_core::scene::{Light, Material, Mesh, Primitive, Scene, Shape, Voxels};
 use polyptych_core::seam::{Control, Decision, Need, RenderError, Renderer};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -259,4 +259,47 @@ fn a_picture_that_shows_the_frame_already_is_not_drawn_again() {
     flat.settings.set("raster", &raster.info().parameters.clone(), "shading", "flat").unwrap();
     prepare(&mut raster, &scene, &flat);
     assert!(draws(&mut raster, &flat, &mut picture));
+}
+
+#[test]
+fn no_more_triangles_are_drawn_than_the_tolerance_asks_for() {
+    // Hills so gentle that from far away they are as good as flat.
+    let mut mesh = Mesh::default();
+    for i in 0..101 * 101 {
+        let (x, y) = ((i % 101) as f32 * 0.1, (i / 101) as f32 * 0.1);
+        mesh.positions.push(Vec3::new(x - 5.0, y - 5.0, 0.002 * (x * 2.0).sin() * (y * 2.0).cos()));
+    }
+    for i in (0..100 * 101).filter(|i| i % 101 < 100) {
+        mesh.triangles.extend([[i, i + 1, i + 101], [i + 1, i + 102, i + 101]]);
+    }
+    let count = mesh.triangles.len();
+    let mut scene = scene_of(vec![(Shape::Mesh(mesh), [0.0; 3]), (cube(1.0), [0.0, 0.0, 2.0])]);
+    scene.lights.push(Light::directional(DVec3::new(-0.3, -0.5, -1.0)));
+    let scene = Arc::new(scene);
+    let (mut raster, control) = (Raster::new(), Control::simple());
+    let declared = raster.info().parameters.clone();
+    let mut draw = |triangles: &str, tolerance_px: f64| {
+        let mut need = Need::new(camera([0.5, 1.0, 14.0], [0.0; 3]), 240, 160);
+        (need.channels, need.tolerance_px) = (Channels::ALL, tolerance_px);
+        need.settings.set("raster", &declared, "triangles", triangles).unwrap();
+        let prepared = raster.prepare(&scene, &need, &Converter::default(), &control).unwrap();
+        let mut picture = Framebuffer::new(240, 160, need.channels);
+        let report = raster.render(&need.frame(), &mut picture, &control).unwrap();
+        assert_eq!(raster.plan(&scene, &need).objects[1].decision, prepared.objects[1]);
+        (prepared.objects[0].clone(), report.counters[0].unwrap().count, picture)
+    };
+    let (decision, all, given) = draw("all", 0.5);
+    assert!(decision == Decision::Exact && all as usize > count / 2, "{decision:?} {all}");
+    let (decision, few, picture) = draw("needed", 0.5);
+    let Decision::Converted { bound, why } = decision else { panic!("{decision:?}") };
+    assert!(
+        bound > 0.0 && bound < 0.05 && few * 3 < all && why.contains("of 20000 triangles"),
+        "{bound} {few} {why}"
+    );
+    assert!(picture.id() == given.id(), "borders stay");
+    let off = |i: usize| (picture.distance()[i] - given.distance()[i]).abs();
+    let most = (0..given.id().len()).filter(|&i| given.id()[i] != 0).map(off).fold(0.0, f32::max);
+    assert!(f64::from(most) < 2.0 * bound, "{most} for {bound}");
+    let (_, more, _) = draw("needed", 0.001);
+    assert!(more > few, "{more} {few}");
 }
