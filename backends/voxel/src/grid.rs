@@ -11,10 +11,10 @@ use std::sync::Arc;
 pub(crate) struct Layer {
     pub(crate) size: [i32; 3],
     /// Chunks in a row along x, and in a slab of x and y.
-    row: usize,
-    slab: usize,
-    /// Nothing stands for an empty chunk.
-    chunks: Vec<Option<Arc<Occupancy>>>,
+    pub(crate) row: usize,
+    pub(crate) slab: usize,
+    /// Empty chunks share the masks of one.
+    pub(crate) chunks: Vec<Arc<Occupancy>>,
 }
 
 impl Layer {
@@ -23,10 +23,7 @@ impl Layer {
     pub(crate) fn empty_around(&self, cell: [i32; 3]) -> Option<u32> {
         let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         let chunk = |c: u32| (c / CHUNK) as usize;
-        match &self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)] {
-            None => Some(Occupancy::EXPONENT),
-            Some(chunk) => chunk.empty_around([x, y, z]),
-        }
+        self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)].empty_around([x, y, z])
     }
 
     /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells at a cell; false beyond the
@@ -37,12 +34,11 @@ impl Layer {
         }
         let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         let chunk = |c: u32| (c / CHUNK) as usize;
-        let chunk = &self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)];
-        chunk.as_ref().is_some_and(|chunk| chunk.has_block([x, y, z], exponent))
+        self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)].has_block([x, y, z], exponent)
     }
 
     fn bytes(&self) -> u64 {
-        (self.chunks.len() * size_of::<Option<Arc<Occupancy>>>()) as u64
+        (self.chunks.len() * size_of::<Arc<Occupancy>>()) as u64
     }
 }
 
@@ -103,8 +99,19 @@ struct Built {
 pub(crate) struct Chunks {
     kept: HashMap<Recipe, Built>,
     used: HashMap<Recipe, Built>,
+    nothing: Nothing,
     /// Chunks that had to be built since [`Chunks::begin`].
     pub(crate) built: u64,
+}
+
+/// The masks of every empty chunk.
+#[derive(Debug)]
+struct Nothing(Arc<Occupancy>);
+
+impl Default for Nothing {
+    fn default() -> Self {
+        Self(Arc::new(Occupancy::EMPTY))
+    }
 }
 
 impl Chunks {
@@ -155,7 +162,11 @@ impl Chunks {
             size: voxels.size().map(|s| s as i32),
             row: cx,
             slab: cx * cy,
-            chunks: recipes.iter().map(|r| pick(self.used.get(r.as_ref()?)?).clone()).collect(),
+            chunks: recipes
+                .iter()
+                .map(|r| pick(self.used.get(r.as_ref()?)?).clone())
+                .map(|masks| masks.unwrap_or_else(|| self.nothing.0.clone()))
+                .collect(),
         };
         Grid { seen: layer(|b| &b.seen), blocking: layer(|b| &b.blocking), voxels: voxels.clone() }
     }
@@ -222,11 +233,8 @@ mod tests {
         let voxels = Voxels::from_fn([128, 4, 4], |x, _, _| if x < 64 { 1 } else { 2 });
         let mut chunks = Chunks::default();
         let grid = chunks.grid(&voxels, Values::of(|_| true), Values::of(|v| v == 1), &OneThread);
-        let same = |i: usize| match (&grid.seen.chunks[i], &grid.blocking.chunks[i]) {
-            (Some(a), Some(b)) => Some(Arc::ptr_eq(a, b)),
-            (Some(_), None) => None,
-            other => panic!("{other:?}"),
-        };
-        assert_eq!((same(0), same(1)), (Some(true), None));
+        let same = |i: usize| Arc::ptr_eq(&grid.seen.chunks[i], &grid.blocking.chunks[i]);
+        assert_eq!((same(0), same(1)), (true, false));
+        assert_eq!(*grid.blocking.chunks[1], Occupancy::EMPTY);
     }
 }

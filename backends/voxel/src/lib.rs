@@ -15,8 +15,10 @@
 mod beam;
 mod grid;
 mod lamps;
+mod light;
 mod model;
 mod occupancy;
+mod octet;
 mod paint;
 mod plan;
 mod renderer;

@@ -1,12 +1,13 @@
 //! A picture, tile by tile: what can the rays of a tile meet, what do they meet, and what color is it?
 
 use crate::beam::Bundle;
+use crate::octet::{Bytes, NOTHING, Octet, Rays};
 use crate::trace::{Shadows, Tracer, Wants, finite};
-use crate::world::Reach;
+use crate::world::{LIFT, Reach, World};
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection, View};
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
-use polyptych_core::lanes::{F64x8, I32x8, LANES};
+use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
 use polyptych_core::math::{Aabb, Ray};
 use polyptych_core::seam::Control;
 
@@ -22,6 +23,7 @@ pub(crate) struct Painter<'a> {
     /// Whether the rays of a tile lie between those of its corners.
     is_straight: bool,
     wants: Wants,
+    channels: Channels,
 }
 
 /// Pixels of a band that are drawn together.
@@ -34,11 +36,75 @@ struct Tile {
 }
 
 impl Tile {
+    /// Lists first columns and rows of neighboring pixels, eight at a time.
+    fn octets(self) -> impl Iterator<Item = (u32, u32)> {
+        (0..self.rows).flat_map(move |row| (0..self.columns).step_by(LANES).map(move |column| (column, row)))
+    }
+
     /// Lists the pixels by rows: index in the tile, column in the picture, row in the band.
     fn pixels(self) -> impl Iterator<Item = (usize, u32, u32)> {
         (0..self.rows).flat_map(move |row| {
             (0..self.columns).map(move |x| ((row * TILE + x) as usize, self.first_column + x, row))
         })
+    }
+}
+
+/// A box around the surfaces that a tile sees.
+struct Sites {
+    least: DVec3x8,
+    most: DVec3x8,
+    farthest: F64x8,
+    radius: f64,
+}
+
+impl Default for Sites {
+    fn default() -> Self {
+        Self {
+            least: DVec3x8::splat(DVec3::INFINITY),
+            most: DVec3x8::splat(DVec3::NEG_INFINITY),
+            farthest: F64x8::ZERO,
+            radius: 0.0,
+        }
+    }
+}
+
+impl Sites {
+    #[inline(always)]
+    fn add(&mut self, world: &World, octet: &Octet) {
+        let (position, seen) = (octet.position(), octet.seen());
+        let take = |on: bool, yes: F64x8, no: F64x8| {
+            F64x8::pick(seen, if on { yes.min(no) } else { yes.max(no) }, no)
+        };
+        self.least.x = take(true, position.x, self.least.x);
+        self.least.y = take(true, position.y, self.least.y);
+        self.least.z = take(true, position.z, self.least.z);
+        self.most.x = take(false, position.x, self.most.x);
+        self.most.y = take(false, position.y, self.most.y);
+        self.most.z = take(false, position.z, self.most.z);
+        self.farthest = take(false, octet.t, self.farthest);
+        let first = octet.item[0];
+        let mut last = NOTHING;
+        for item in octet.item {
+            if item != NOTHING && item != last {
+                self.radius = self.radius.max(world.items[item as usize].radius);
+                last = item;
+            }
+        }
+        let _ = first;
+    }
+
+    /// Returns the box, grown by as much as rays begin above surfaces.
+    fn bounds(&self, _world: &World) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        let mut largest = self.radius;
+        for i in 0..LANES {
+            if self.most.x.0[i] >= self.least.x.0[i] {
+                let (least, most) = (self.least.get(i), self.most.get(i));
+                bounds = bounds.with(least).with(most);
+                largest = largest.max(self.farthest.0[i]).max(least.abs().max(most.abs()).max_element());
+            }
+        }
+        if bounds.is_empty() { bounds } else { bounds.grown(largest * LIFT) }
     }
 }
 
@@ -56,6 +122,7 @@ impl<'a> Painter<'a> {
                 Projection::Perspective { .. } | Projection::Orthographic { .. }
             ),
             wants: wants(target.channels()),
+            channels: target.channels(),
         }
     }
 
@@ -174,26 +241,39 @@ impl<'a> Painter<'a> {
     /// Draws a tile whose rays may meet a few grids in known places.
     #[inline(always)]
     fn tile(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile, reach: &Reach) {
-        let mut rays = [None; TILE_RAYS];
-        let mut met = [None; TILE_RAYS];
-        let mut sites = Aabb::EMPTY;
-        self.rays(tile, &mut rays);
-        for (i, _, _) in tile.pixels() {
-            let Some(ray) = rays[i] else { continue };
-            met[i] = tracer.world.meet_within(&ray, reach, &tracer.counts);
-            if let Some(met) = &met[i] {
-                sites = tracer.world.with_site(sites, &ray, met);
-            }
+        let bytes = if self.wants.color || self.wants.shadow || self.channels.has(Channel::Albedo) {
+            Bytes::Read
+        } else {
+            Bytes::Unread
+        };
+        let nothing = Rays {
+            origin: DVec3x8::splat(DVec3::ZERO),
+            direction: DVec3x8::splat(DVec3::ZERO),
+            there: Mask8::NONE,
+        };
+        let mut octets = [Octet::nothing(nothing); TILE_RAYS / LANES];
+        let mut sites = Sites::default();
+        let mut seen = 0;
+        for (octet, (column, row)) in octets.iter_mut().zip(tile.octets()) {
+            let y = f64::from(tile.first_row + row) + 0.5;
+            let x = I32x8::count_from((tile.first_column + column) as i32).to_f64() + F64x8::splat(0.5);
+            let (origin, direction, there) = self.view.rays(x, y);
+            let there = there & Mask8::first((tile.columns - column) as usize);
+            seen += u64::from(there.count());
+            *octet = tracer.world.meet_octet(Rays { origin, direction, there }, reach, bytes, &tracer.counts);
+            sites.add(tracer.world, octet);
         }
-        let lights = self.lights(tracer, sites);
-        let (mut seen, nothing) = (0, Pixel::background(Vec3::ZERO));
-        for (i, x, row) in tile.pixels() {
-            let Some(ray) = rays[i] else {
-                band.put(x, row, &nothing);
-                continue;
-            };
-            seen += 1;
-            band.put(x, row, &tracer.color(&ray, met[i], &lights, self.wants));
+        let lights = self.lights(tracer, sites.bounds(tracer.world));
+        for (octet, (column, row)) in octets.iter().zip(tile.octets()) {
+            let count = (tile.columns - column).min(LANES as u32);
+            tracer.write(
+                octet,
+                &lights,
+                self.wants,
+                band,
+                self.channels,
+                (tile.first_column + column, row, count),
+            );
         }
         tracer.counts.rays.set(tracer.counts.rays.get() + seen);
     }

@@ -7,7 +7,7 @@ use crate::occupancy::Values;
 use crate::paint::{Painter, TILE};
 use crate::plan::plan;
 use crate::trace::{Shadows, Tracer};
-use crate::world::{Counts, Item, World};
+use crate::world::{Counts, Item, Numbers, World};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::scene::{AlphaMode, Scene, ShapeKind};
@@ -69,6 +69,14 @@ impl Voxel {
         need.settings.int(&self.info.parameters, "detail.resolution").clamp(16, 1024) as u32
     }
 
+    fn walk(&self, need: &Need) -> Numbers {
+        match need.settings.text(&self.info.parameters, "walk") {
+            "fast" => Numbers::Fast,
+            "f64" => Numbers::Double,
+            _ => Numbers::Exact,
+        }
+    }
+
     fn shadows(&self, need: &Need) -> Shadows {
         if need.settings.bool(&self.info.parameters, "shadow") { Shadows::Hard } else { Shadows::Off }
     }
@@ -114,6 +122,15 @@ fn info() -> BackendInfo {
                 unit: "cells",
                 help: "Most cells along the longest edge of an object that is converted",
                 tag: "detail.tolerance",
+                quality_axis: true,
+            },
+            Parameter {
+                name: "walk",
+                kind: ParameterKind::Choice { choices: &["fast", "exact", "f64"] },
+                default: Value::Text("exact".to_owned()),
+                unit: "",
+                help: "Numbers that rays are walked in",
+                tag: "",
                 quality_axis: true,
             },
             Parameter {
@@ -169,7 +186,7 @@ impl Renderer for Voxel {
         for (lamp, shadow) in lamps.iter_mut().zip(&demand.shadows) {
             lamp.is_blocked = shadow.is_ok();
         }
-        let world = World::new(model.scene, items, lamps);
+        let world = World::new(model.scene, items, lamps, self.walk(need));
         let bytes = world.bytes() + grid_bytes + self.chunks.bytes();
         let decisions: Arc<[Decision]> = model.decisions.into();
         self.ready = Some(Ready {

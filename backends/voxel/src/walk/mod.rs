@@ -14,6 +14,9 @@
 //! Axes along which the ray descends are mirrored: cell `c` becomes `!c = -1 - c`, so that every ray ascends
 //! and every aligned block stays an aligned block.
 
+mod lanes;
+pub(crate) mod packet;
+
 #[cfg(test)]
 mod tests;
 
