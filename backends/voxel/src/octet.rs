@@ -37,7 +37,7 @@ pub(crate) struct Octet {
     pub(crate) item: [u32; LANES],
     /// See [`crate::walk::Walk::face`].
     pub(crate) face: [u8; LANES],
-    /// Byte of each cell, 0 where nobody asked for it.
+    /// Byte of each cell. This, and what follows, is told where it was asked for.
     pub(crate) value: [u8; LANES],
     pub(crate) began_inside: Mask8,
     /// Where the cells were entered, in the space of their grids: exactly in the face.
@@ -48,7 +48,7 @@ pub(crate) struct Octet {
     pub(crate) rank: [i32; LANES],
 }
 
-/// Whether the bytes of cells are asked for.
+/// Whether more than distances and faces is asked for: the bytes of cells, and where they were entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Bytes {
     Read,
@@ -145,8 +145,8 @@ impl Octet {
 impl World {
     /// Finds the first surfaces that rays from the eye meet, among what their tile can reach.
     #[inline(always)]
-    pub(crate) fn meet_octet(&self, rays: Rays, reach: &Reach, bytes: Bytes, counts: &Counts) -> Octet {
-        let mut octet = Octet::nothing(rays);
+    pub(crate) fn meet_octet(&self, octet: &mut Octet, reach: &Reach, bytes: Bytes, counts: &Counts) {
+        let rays = octet.rays;
         for (index, span) in reach.grids.iter().flatten() {
             let (index, item) = (*index, &self.items[*index as usize]);
             let layer = &item.grid.seen;
@@ -155,7 +155,7 @@ impl World {
                 _ => Order::Exact,
             };
             if !Packet::can(layer.size) || self.walk == Numbers::Double {
-                self.meet_each(&mut octet, index, span, rays.there, counts);
+                self.meet_each(octet, index, span, rays.there, counts);
                 continue;
             }
             let map = &item.grid_from_world;
@@ -170,16 +170,15 @@ impl World {
             counts.steps.set(counts.steps.get() + u64::from(packet.steps));
             if hits.marked != 0 {
                 if item.without_holes {
-                    self.take(&mut octet, &grid_rays, &packet, index, mask_of(hits.marked), bytes);
+                    self.take(octet, &grid_rays, &packet, index, mask_of(hits.marked), bytes);
                 } else {
-                    self.meet_each(&mut octet, index, span, mask_of(hits.marked), counts);
+                    self.meet_each(octet, index, span, mask_of(hits.marked), counts);
                 }
             }
             if packet.refused.any() {
-                self.meet_each(&mut octet, index, span, packet.refused, counts);
+                self.meet_each(octet, index, span, packet.refused, counts);
             }
         }
-        octet
     }
 
     /// Asks ray by ray.
@@ -217,6 +216,15 @@ impl World {
         }
         let taken = marked & nearer;
         octet.t = F64x8::pick(taken, faces.t, octet.t);
+        for i in 0..LANES {
+            if taken.has(i) {
+                octet.item[i] = index;
+                octet.face[i] = faces.face.0[i] as u8;
+            }
+        }
+        if bytes == Bytes::Unread {
+            return;
+        }
         octet.site = DVec3x8::pick(taken, faces.point, octet.site);
         for a in 0..3 {
             octet.before[a] = I32x8::pick(taken, faces.before[a], octet.before[a]);
@@ -225,13 +233,9 @@ impl World {
         let grid = &self.items[index as usize].grid;
         for i in 0..LANES {
             if taken.has(i) {
-                octet.item[i] = index;
-                octet.face[i] = faces.face.0[i] as u8;
                 octet.rank[i] = faces.rank.0[i];
-                if bytes == Bytes::Read {
-                    let cell = [faces.cell[0].0[i], faces.cell[1].0[i], faces.cell[2].0[i]];
-                    octet.value[i] = grid.value(cell);
-                }
+                let cell = [faces.cell[0].0[i], faces.cell[1].0[i], faces.cell[2].0[i]];
+                octet.value[i] = grid.value(cell);
             }
         }
     }

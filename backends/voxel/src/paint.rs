@@ -82,7 +82,6 @@ impl Sites {
         self.most.y = take(false, position.y, self.most.y);
         self.most.z = take(false, position.z, self.most.z);
         self.farthest = take(false, octet.t, self.farthest);
-        let first = octet.item[0];
         let mut last = NOTHING;
         for item in octet.item {
             if item != NOTHING && item != last {
@@ -90,11 +89,10 @@ impl Sites {
                 last = item;
             }
         }
-        let _ = first;
     }
 
     /// Returns the box, grown by as much as rays begin above surfaces.
-    fn bounds(&self, _world: &World) -> Aabb {
+    fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         let mut largest = self.radius;
         for i in 0..LANES {
@@ -260,10 +258,13 @@ impl<'a> Painter<'a> {
             let (origin, direction, there) = self.view.rays(x, y);
             let there = there & Mask8::first((tile.columns - column) as usize);
             seen += u64::from(there.count());
-            *octet = tracer.world.meet_octet(Rays { origin, direction, there }, reach, bytes, &tracer.counts);
-            sites.add(tracer.world, octet);
+            octet.rays = Rays { origin, direction, there };
+            tracer.world.meet_octet(octet, reach, bytes, &tracer.counts);
+            if bytes == Bytes::Read {
+                sites.add(tracer.world, octet);
+            }
         }
-        let lights = self.lights(tracer, sites.bounds(tracer.world));
+        let lights = self.lights(tracer, sites.bounds());
         for (octet, (column, row)) in octets.iter().zip(tile.octets()) {
             let count = (tile.columns - column).min(LANES as u32);
             tracer.write(

@@ -180,6 +180,9 @@ impl Packet {
         let zero = F64x8::ZERO;
         let late = stretch.from.above(zero);
         let mut start = F64x8::pick(late, stretch.from, zero);
+        if let Some(cell) = rays.cells_within(size, start) {
+            return Self::at(rays, size, cell, I32x8::splat(3), start, stretch.to, rays.there);
+        }
         let mut axis = I32x8::pick(late, I32x8::splat(0), I32x8::splat(3));
         let (mut entered, mut active) = (I32x8::splat(3), rays.there);
         let low = |a: usize| rays.flip[a] & I32x8::splat(-size[a]);
@@ -273,8 +276,7 @@ impl Packet {
             let direction = rays.direction[a] * unit;
             packet.direction[a] = direction.round().0;
             let still = F64x8::splat(1e-30).above(direction);
-            let inverse = F64x8::splat(1.0) / direction;
-            let inverse = F64x8::pick(still, F64x8::splat(f64::INFINITY), inverse);
+            let inverse = F64x8::pick(still, F64x8::splat(f64::INFINITY), rays.inverse[a] * longest);
             packet.inverse[a] = inverse.round().0;
             packet.fuzz[a] = (inverse * doubt).round().0;
             // All planes of what stands still lie at infinity.
@@ -431,25 +433,30 @@ macro_rules! kernel {
                 let (top_word, top_bit) = child([fall::<4>(x), fall::<4>(y), and(fall::<4>(z), all(3))], zero);
                 let node = or(rise::<5>(top_word), top_bit);
                 let (middle_word, middle_bit) = child([fall::<2>(x), fall::<2>(y), fall::<2>(z)], node);
-                let (chunk, top, middle) = (apart(chunk), apart(top_word), apart(middle_word));
-                let (mut words, mut others, mut below_words) = ([0; LANES], [0; LANES], [0; LANES]);
+                let (chunk, middle) = (apart(chunk), apart(middle_word));
                 let mut chunks = [&*layer.chunks[chunk[0] as usize]; LANES];
+                let mut words = [0; LANES];
                 for i in 0..LANES {
-                    let masks = &*layer.chunks[chunk[i] as usize];
-                    chunks[i] = masks;
-                    words[i] = masks.top[(top[i] & 1) as usize] as i32;
-                    others[i] = masks.top[(top[i] & 1 ^ 1) as usize] as i32;
-                    below_words[i] = masks.middle[(middle[i] & 0x7f) as usize] as i32;
+                    chunks[i] = &*layer.chunks[chunk[i] as usize];
+                    words[i] = chunks[i].middle[(middle[i] & 0x7f) as usize] as i32;
                 }
+                // One less than the edge of the empty block: of 4 or 8 cells, then of 16, 32 or 64, or of 1 or 2.
                 let words = ints(&words);
-                let (in_top, wide) = look(words, top_bit);
-                let nothing = equal(or(words, ints(&others)), zero);
-                // One less than the edge of the empty block: of 16, 32 or 64 cells, then of 4 or 8, then of 1 or 2.
-                let mut mask = or(all(15), and(wide, all(16)));
-                mask = or(mask, and(nothing, all(63)));
-                let (in_middle, wide) = look(ints(&below_words), middle_bit);
-                mask = pick(in_top, or(all(3), and(wide, all(4))), mask);
-                let reaching = and(in_top, in_middle);
+                let (reaching, wide) = look(words, middle_bit);
+                let mut mask = or(all(3), and(wide, all(4)));
+                let bare = and(equal(words, zero), left);
+                if bits(bare) != 0 {
+                    let (top, mut words, mut others) = (apart(top_word), [0; LANES], [0; LANES]);
+                    for i in 0..LANES {
+                        words[i] = chunks[i].top[(top[i] & 1) as usize] as i32;
+                        others[i] = chunks[i].top[(top[i] & 1 ^ 1) as usize] as i32;
+                    }
+                    let words = ints(&words);
+                    let (in_top, wide) = look(words, top_bit);
+                    let nothing = equal(or(words, ints(&others)), zero);
+                    let large = or(or(all(15), and(wide, all(16))), and(nothing, all(63)));
+                    mask = pick(without(bare, in_top), large, mask);
+                }
                 if bits(and(reaching, left)) != 0 {
                     let node = or(rise::<5>(middle_word), middle_bit);
                     let (word, bit) = child([x, y, z], node);
@@ -562,6 +569,25 @@ impl GridRays {
             self.correct(a, &mut cell, [from, to], (t, axis), unsure);
         }
         cell
+    }
+
+    /// Returns the cells at some distances, if all of them are beyond doubt and within the grid.
+    #[inline(always)]
+    fn cells_within(&self, size: [i32; 3], t: F64x8) -> Option<[I32x8; 3]> {
+        let mut cells = [I32x8::splat(0); 3];
+        let (mut sure, one) = (Mask8::ALL, F64x8::splat(1.0));
+        for (a, &edge) in size.iter().enumerate() {
+            let step = self.direction[a] * t;
+            let place = self.origin[a] + step;
+            let cell = (place - F64x8::splat(0.5)).nearest();
+            let within = place - cell.to_f64();
+            let slack = (self.origin[a].abs() + step + one) * F64x8::splat(super::ROUNDING);
+            let given = cell ^ self.flip[a];
+            let inside = !given.is_negative() & given.below(I32x8::splat(edge));
+            sure = sure & within.above(slack) & (one - slack).above(within) & inside & !self.still[a];
+            cells[a] = cell;
+        }
+        (!(self.there & !sure).any()).then_some(cells)
     }
 
     #[cold]
