@@ -4,8 +4,8 @@
 //! holes, a ray that began in a cell, a grid too long for single precision) is asked of them, ray by ray.
 
 use crate::beam::Span;
-use crate::walk::packet::{GridRays, Order, Packet, Stretch};
-use crate::world::{Counts, LIFT, Met, Numbers, Place, Reach, Site, World};
+use crate::walk::packet::{GridRays, Packet, Stretch};
+use crate::world::{Counts, LIFT, Met, Place, Reach, Site, World};
 use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
 use polyptych_core::math::Ray;
 
@@ -150,14 +150,10 @@ impl World {
         for (index, span) in reach.grids.iter().flatten() {
             let (index, item) = (*index, &self.items[*index as usize]);
             let layer = &item.grid.seen;
-            let order = match self.walk {
-                Numbers::Fast => Order::Rounded,
-                _ => Order::Exact,
-            };
-            if !Packet::can(layer.size) || self.walk == Numbers::Double {
+            let Some(order) = self.walk.order().filter(|_| Packet::can(layer.size)) else {
                 self.meet_each(octet, index, span, rays.there, counts);
                 continue;
-            }
+            };
             let map = &item.grid_from_world;
             let origin = rays.origin.turned(&map.matrix3) + DVec3x8::splat(map.translation);
             let grid_rays = GridRays::new(origin, rays.direction.turned(&map.matrix3), rays.there);
@@ -265,7 +261,7 @@ impl World {
         counts: &Counts,
     ) -> Mask8 {
         let lifted = self.lifted(octet, normal);
-        let Some(reach) = reach.filter(|_| self.walk != Numbers::Double) else {
+        let (Some(reach), Some(order)) = (reach, self.walk.order()) else {
             return self.blocked_each(octet, (lifted, to_light, ends), asked, reach, counts);
         };
         let mut blocked = Mask8::NONE;
@@ -284,10 +280,6 @@ impl World {
             }
             let map = &item.grid_from_world;
             let direction = to_light.turned(&map.matrix3);
-            let order = match self.walk {
-                Numbers::Fast => Order::Rounded,
-                _ => Order::Exact,
-            };
             for (lanes, is_own) in [(own, true), (open & !own, false)] {
                 if !lanes.any() {
                     continue;

@@ -73,6 +73,7 @@ impl Voxel {
         match need.settings.text(&self.info.parameters, "walk") {
             "fast" => Numbers::Fast,
             "f64" => Numbers::Double,
+            "fixed" => Numbers::Fixed,
             _ => Numbers::Exact,
         }
     }
@@ -126,7 +127,7 @@ fn info() -> BackendInfo {
             },
             Parameter {
                 name: "walk",
-                kind: ParameterKind::Choice { choices: &["fast", "exact", "f64"] },
+                kind: ParameterKind::Choice { choices: &["fast", "exact", "f64", "fixed"] },
                 default: Value::Text("exact".to_owned()),
                 unit: "",
                 help: "Numbers that rays are walked in",

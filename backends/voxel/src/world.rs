@@ -4,7 +4,8 @@ use crate::beam::{Beam, Bundle, Span};
 use crate::grid::{Grid, Layer};
 use crate::lamps::Lamp;
 use crate::tree::{Tree, WorldRay};
-use crate::walk::{Found, GridRay, Moment, Walk};
+use crate::walk::packet::Order;
+use crate::walk::{Found, GridRay, Moment, Walk, fixed};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use polyptych_core::math::{Aabb, Ray};
 use polyptych_core::scene::{AlphaMode, Material, Scene};
@@ -32,6 +33,19 @@ pub(crate) enum Numbers {
     Exact,
     /// In double precision, ray by ray.
     Double,
+    /// In fixed point, ray by ray.
+    Fixed,
+}
+
+impl Numbers {
+    /// Returns how eight rays are walked at once, if they are.
+    pub(crate) fn order(self) -> Option<Order> {
+        match self {
+            Self::Fast => Some(Order::Rounded),
+            Self::Exact => Some(Order::Exact),
+            Self::Double | Self::Fixed => None,
+        }
+    }
 }
 
 /// A grid in its place.
@@ -254,6 +268,15 @@ impl World {
         self.first_surface(index, walk, None, Place::START, before.min(leave), counts)
     }
 
+    /// Goes on to the first marked cell in the numbers that were chosen.
+    #[inline(always)]
+    fn find_marked(&self, walk: &mut Walk, layer: &Layer, before: f64) -> Found {
+        if self.walk == Numbers::Fixed {
+            return fixed::find_marked(walk, layer, before);
+        }
+        walk.find_marked(layer, before)
+    }
+
     /// Finds the first surface behind a place.
     pub(crate) fn meet(&self, ray: &Ray, start: Start<'_>, after: Place, counts: &Counts) -> Option<Met> {
         let mut best: Option<Met> = None;
@@ -285,7 +308,7 @@ impl World {
     ) -> Option<Met> {
         let item = &self.items[index];
         let found = loop {
-            let marked = walk.find_marked(&item.grid.seen, before);
+            let marked = self.find_marked(&mut walk, &item.grid.seen, before);
             let Found::Marked { passed_empty } = marked else { break None };
             let value = item.grid.value(walk.cell());
             // Cells of one value are one body: only its outside is a surface.
@@ -385,7 +408,9 @@ impl World {
         // The cell in front of a surface was passed before: what it holds let the ray through.
         let mut previous = (own && !site.is_within_solid).then(|| item.grid.value(walk.cell()));
         let blocked = loop {
-            let Found::Marked { passed_empty } = walk.find_marked(layer, last) else { break false };
+            let Found::Marked { passed_empty } = self.find_marked(&mut walk, layer, last) else {
+                break false;
+            };
             if walk.t >= before {
                 break false;
             }

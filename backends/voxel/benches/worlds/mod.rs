@@ -43,20 +43,21 @@ impl Kind {
         })
     }
 
-    /// From where it is seen, and to where, in a grid of 1024x256x1024 cells.
+    /// From where it is seen, and to where: places in a grid of 1024x256x1024 cells, moved with the size of the one
+    /// at hand.
     #[must_use]
     pub(crate) fn view(self, voxels: &Voxels) -> (DVec3, DVec3) {
-        match self {
+        let scale = f64::from(voxels.size()[0]) / 1024.0;
+        let (mut eye, target) = match self {
             Self::Terrain => (DVec3::new(100.3, 230.2, 90.7), DVec3::new(600.0, 60.0, 650.0)),
-            Self::Caves => {
-                let mut eye = DVec3::new(512.3, 128.2, 512.4);
-                while voxels.get(eye.x as u32, eye.y as u32, eye.z as u32) != 0 {
-                    eye.x += 1.0;
-                }
-                (eye, DVec3::new(700.0, 120.0, 800.0))
-            }
+            Self::Caves => (DVec3::new(512.3, 128.2, 512.4), DVec3::new(700.0, 120.0, 800.0)),
             Self::Specks => (DVec3::new(3.3, 128.2, 4.7), DVec3::new(600.0, 100.0, 650.0)),
+        };
+        eye *= scale;
+        while voxels.get(eye.x as u32, eye.y as u32, eye.z as u32) != 0 {
+            eye.x += 1.0;
         }
+        (eye, target * scale)
     }
 }
 
