@@ -13,7 +13,7 @@ use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::parallel::Pool;
-use polyptych_core::scene::{Light, Material, Object, Scene, Shape, Voxels};
+use polyptych_core::scene::{Brush, History, Light, Material, Object, Region, Scene, Shape, Voxels};
 use polyptych_core::seam::{Control, Need, Renderer};
 use polyptych_voxel::Voxel;
 use std::sync::{Arc, OnceLock};
@@ -119,4 +119,57 @@ fn walks<const NUMBERS: usize>(bencher: Bencher, kind: Kind) {
 #[divan::bench(args = Kind::ALL, consts = [1, 2], sample_count = 9, sample_size = 1)]
 fn lit_with_shadows<const THREADS: usize>(bencher: Bencher, kind: Kind) {
     Stage::new(kind, Channels::NONE.with(Channel::Color), &[], THREADS).draw(bencher);
+}
+
+/// Ten thousand edits of a world of 1024^3 cells: one cell, a box, or a ball each.
+#[divan::bench(sample_count = 10_000, sample_size = 1)]
+fn edits(bencher: Bencher) {
+    let mut voxels = Kind::Terrain.build([1024, 1024, 1024]);
+    let mut state = 7u64;
+    let mut history = History::default();
+    bencher
+        .with_inputs(|| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            [17, 29, 41, 53].map(|shift| (state >> shift) as u32 & 1023)
+        })
+        .bench_local_values(|[x, y, z, kind]| {
+            let at = [x, y, z];
+            let center = DVec3::from_array(at.map(f64::from));
+            let region = match kind % 3 {
+                0 => Region::Cell(at),
+                1 => Region::Box { from: at, to: at.map(|c| c + 4) },
+                _ => Region::Sphere { center, radius: 3.0 },
+            };
+            history.edit(&mut voxels, &region, Brush::Set((kind % 5) as u8))
+        });
+    while history.undo(&mut voxels) {}
+}
+
+/// The same, each with the masks made ready for the next frame.
+#[divan::bench(sample_count = 2_000, sample_size = 1)]
+fn edits_made_ready(bencher: Bencher) {
+    let mut scene = Scene::default();
+    let earth = scene.add_material(Material::new(Vec3::new(0.4, 0.5, 0.3)));
+    let voxels = Kind::Terrain.build([1024, 1024, 1024]);
+    scene.objects.push(Object::new("world", Shape::Voxels(voxels), earth));
+    let view = Projection::Perspective { fov_y: 0.9 };
+    let need = Need::new(Camera::look_at(DVec3::splat(900.0), DVec3::ZERO, DVec3::Y, view), 64, 64);
+    let (pool, converter) = (Pool::new(1).expect("threads"), Converter::default());
+    let mut voxel = Voxel::new();
+    let mut scene = Arc::new(scene);
+    voxel.prepare(&scene, &need, &converter, &Control::new(&pool)).expect("a scene");
+    let mut state = 7u64;
+    bencher.bench_local(|| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let at = [17, 29, 41].map(|shift| (state >> shift) as u32 & 1023);
+        let mut edited = Scene::clone(&scene);
+        let mut shape = Shape::clone(&edited.objects[0].shape);
+        if let Shape::Voxels(voxels) = &mut shape {
+            let region = Region::Sphere { center: DVec3::from_array(at.map(f64::from)), radius: 3.0 };
+            voxels.edit(&region, Brush::Set((at[0] % 3) as u8));
+        }
+        edited.objects[0].shape = Arc::new(shape);
+        scene = Arc::new(edited);
+        voxel.prepare(&scene, &need, &converter, &Control::new(&pool)).expect("a scene");
+    });
 }

@@ -112,6 +112,56 @@ impl Occupancy {
         }
     }
 
+    /// Tells whether nothing is marked.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.top == [0; 2]
+    }
+
+    /// Marks anew what became another byte: blocks of 4^3 cells in which something did.
+    pub(crate) fn renew(&mut self, (old, new): (&[u8], &[u8]), end: [u32; 3], wanted: &Values) {
+        const ROW: usize = CHUNK as usize;
+        let wanted: [bool; 256] = std::array::from_fn(|v| wanted.has(v as u8));
+        // Slabs of a layer first: most are as they were, and comparing is as fast as reading.
+        for z in 0..end[2] as usize {
+            let slab = z * ROW * ROW..(z + 1) * ROW * ROW;
+            if old[slab.clone()] == new[slab.clone()] {
+                continue;
+            }
+            for y in 0..end[1] as usize {
+                let row = slab.start + y * ROW..slab.start + (y + 1) * ROW;
+                if old[row.clone()] == new[row.clone()] {
+                    continue;
+                }
+                for x in (0..ROW).step_by(4) {
+                    let four = row.start + x..row.start + x + 4;
+                    if old[four.clone()] != new[four.clone()] {
+                        let bits = new[four]
+                            .iter()
+                            .enumerate()
+                            .filter(|(i, v)| x + i < end[0] as usize && wanted[usize::from(**v)]);
+                        let bits = bits.fold(0, |bits, (i, _)| bits | 1u32 << i);
+                        self.put_four([x as u32, y as u32, z as u32], bits);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Marks four cells along x as their bits say, and what lies above them.
+    fn put_four(&mut self, cell: [u32; 3], bits: u32) {
+        let (high, low, bit) = (child(cell, 4), child(cell, 2), child(cell, 0));
+        let put = |word: &mut u32, child: usize, is_set: bool| {
+            *word = *word & !(1 << (child & 31)) | u32::from(is_set) << (child & 31);
+        };
+        let node = (high << 6 | low) << 1;
+        let word = &mut self.bottom[node | bit >> 5];
+        *word = *word & !(0xf << (bit & 31)) | bits << (bit & 31);
+        let is_set = self.bottom[node] | self.bottom[node | 1] != 0;
+        put(&mut self.middle[high << 1 | low >> 5], low, is_set);
+        let is_set = self.middle[high << 1] | self.middle[high << 1 | 1] != 0;
+        put(&mut self.top[high >> 5], high, is_set);
+    }
+
     /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells around a cell.
     pub(crate) fn has_block(&self, cell: [u32; 3], exponent: u32) -> bool {
         let (high, low) = (child(cell, 4), child(cell, 2));

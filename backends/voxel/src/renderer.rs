@@ -98,9 +98,8 @@ impl Voxel {
             let without_holes =
                 (1..=255).all(|v| material(v).alpha == AlphaMode::Opaque || material(v).texture.is_none());
             let key = (Arc::as_ptr(&object.shape).addr(), seen, blocking);
-            let grid = grids
-                .entry(key)
-                .or_insert_with(|| Arc::new(self.chunks.grid(voxels, seen, blocking, control.threads)));
+            let grid =
+                grids.entry(key).or_insert_with(|| self.chunks.grid(voxels, seen, blocking, control.threads));
             items.push(Item::new(scene, index, grid.clone(), without_holes));
         }
         Ok((items, grids.values().map(|g| g.bytes()).sum()))

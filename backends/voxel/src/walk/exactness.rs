@@ -6,7 +6,7 @@ mod worlds;
 
 use super::packet::{GridRays, Order, Packet, Stretch};
 use super::{Found, GridRay, Moment, Walk, fixed};
-use crate::grid::{Chunks, Grid};
+use crate::grid::Chunks;
 use crate::occupancy::Values;
 use glam::DVec3;
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
@@ -59,14 +59,14 @@ struct Wrong {
     fixed: u32,
 }
 
-fn cell_of(walk: Walk, found: Found) -> Option<[i32; 3]> {
+fn cell_of(walk: &Walk, found: Found) -> Option<[i32; 3]> {
     matches!(found, Found::Marked { .. }).then(|| walk.cell())
 }
 
 fn count(kind: Kind, size: [u32; 3], [width, height]: [u32; 2], wrong: &mut Wrong) {
     let voxels = kind.build(size);
     let all = Values::of(|_| true);
-    let grid: Grid = Chunks::default().grid(&voxels, all, all, &OneThread);
+    let grid = Chunks::default().grid(&voxels, all, all, &OneThread);
     let (eye, target) = kind.view(&voxels);
     let eye = (eye * PLACE).round() / PLACE;
     let forward = (target - eye).normalize_or(DVec3::X);
@@ -105,9 +105,9 @@ fn count(kind: Kind, size: [u32; 3], [width, height]: [u32; 2], wrong: &mut Wron
             let mut walk = Walk::begin(ray, edges, Moment::START).unwrap();
             let mut other = walk.clone();
             let found = walk.find_marked(&grid.seen, f64::INFINITY);
-            let double = cell_of(walk, found);
+            let double = cell_of(&walk, found);
             let found = fixed::find_marked(&mut other, &grid.seen, f64::INFINITY);
-            let in_fixed = cell_of(other, found);
+            let in_fixed = cell_of(&other, found);
             wrong.rays += 1;
             wrong.hits += u32::from(expected.is_some());
             wrong.double += u32::from(double != expected);

@@ -56,14 +56,14 @@ impl Course {
     fn new(ray: &GridRay, cell: [i32; 3], t: f64) -> Self {
         let longest = ray.direction[ray.longest_axis()];
         let mut course = Self { origin: [Fixed(0); 3], direction: [Fixed(0); 3], inverse: [Fixed::MOST; 3] };
-        for a in 0..3 {
-            let from = f64::from(cell[a]);
+        for (a, &cell) in cell.iter().enumerate() {
+            let from = f64::from(cell);
             course.origin[a] = Fixed::of((ray.origin[a] + ray.direction[a] * t).clamp(from, from + 1.0));
             course.direction[a] = Fixed::of(ray.direction[a] / longest);
             if course.direction[a].0 > 1 {
                 course.inverse[a] = Fixed::of(longest / ray.direction[a]);
             } else {
-                (course.origin[a], course.direction[a]) = (Fixed::whole(cell[a]), Fixed(0));
+                (course.origin[a], course.direction[a]) = (Fixed::whole(cell), Fixed(0));
             }
         }
         course

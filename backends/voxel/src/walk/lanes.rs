@@ -35,6 +35,7 @@ pub(super) mod wide {
         choose(mask: Ints, yes: Floats, no: Floats) -> Floats { _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(mask)) }
         pick(mask: Ints, yes: Ints, no: Ints) -> Ints { _mm256_blendv_epi8(no, yes, mask) }
         add(a: Ints, b: Ints) -> Ints { _mm256_add_epi32(a, b) }
+        subtract(a: Ints, b: Ints) -> Ints { _mm256_sub_epi32(a, b) }
         multiply(a: Ints, b: Ints) -> Ints { _mm256_mullo_epi32(a, b) }
         and(a: Ints, b: Ints) -> Ints { _mm256_and_si256(a, b) }
         or(a: Ints, b: Ints) -> Ints { _mm256_or_si256(a, b) }
@@ -111,6 +112,7 @@ pub(super) mod plain {
         choose(mask: Ints, yes: Floats, no: Floats) -> Floats { |i| if mask[i] < 0 { yes[i] } else { no[i] } }
         pick(mask: Ints, yes: Ints, no: Ints) -> Ints { |i| if mask[i] < 0 { yes[i] } else { no[i] } }
         add(a: Ints, b: Ints) -> Ints { |i| a[i].wrapping_add(b[i]) }
+        subtract(a: Ints, b: Ints) -> Ints { |i| a[i].wrapping_sub(b[i]) }
         multiply(a: Ints, b: Ints) -> Ints { |i| a[i].wrapping_mul(b[i]) }
         and(a: Ints, b: Ints) -> Ints { |i| a[i] & b[i] }
         or(a: Ints, b: Ints) -> Ints { |i| a[i] | b[i] }

@@ -115,7 +115,9 @@ pub(crate) struct Stretch {
 /// Eight walks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Packet {
-    /// Where the walks begin, mirrored.
+    /// Mirrored cells in which the walks begin: places are counted from them, so that near ones are told best.
+    base: [[i32; LANES]; 3],
+    /// Where the walks begin.
     origin: [[f32; LANES]; 3],
     direction: [[f32; LANES]; 3],
     inverse: [[f32; LANES]; 3],
@@ -243,6 +245,7 @@ impl Packet {
         let edge = f64::from(size[0].max(size[1]).max(size[2])) + 1.0;
         let mut far = F64x8::ZERO;
         let mut packet = Self {
+            base: [[0; LANES]; 3],
             origin: [[0.0; LANES]; 3],
             direction: [[0.0; LANES]; 3],
             inverse: [[0.0; LANES]; 3],
@@ -271,8 +274,7 @@ impl Packet {
             packet.end[a] = ends.0;
             let origin = rays.origin[a] + rays.direction[a] * begun;
             // Within the cell, so that no number is larger than the grid.
-            let from = cell[a].to_f64();
-            let origin = origin.max(from).min(from + F64x8::splat(1.0));
+            let origin = (origin - cell[a].to_f64()).max(F64x8::ZERO).min(F64x8::splat(1.0));
             let direction = rays.direction[a] * unit;
             packet.direction[a] = direction.round().0;
             let still = F64x8::splat(1e-30).above(direction);
@@ -280,9 +282,10 @@ impl Packet {
             packet.inverse[a] = inverse.round().0;
             packet.fuzz[a] = (inverse * doubt).round().0;
             // All planes of what stands still lie at infinity.
-            packet.origin[a] = F64x8::pick(still, from - F64x8::splat(1.0), origin).round().0;
+            packet.origin[a] = F64x8::pick(still, F64x8::splat(-1.0), origin).round().0;
             // Those that go nowhere are looked up, too: in the first cell.
             packet.cell[a] = I32x8::pick(active, cell[a], rays.flip[a]).0;
+            packet.base[a] = packet.cell[a];
         }
         packet.slack = doubt.round().0;
         let to = (to - begun) * longest;
@@ -415,7 +418,7 @@ macro_rules! kernel {
             let threes = |v: &[[i32; 8]; 3]| [ints(&v[0]), ints(&v[1]), ints(&v[2])];
             let (origin, direction, inverse) = (three(&packet.origin), three(&packet.direction), three(&packet.inverse));
             let (fuzz, slack, to) = (three(&packet.fuzz), floats(&packet.slack), floats(&packet.to));
-            let (flip, end) = (threes(&packet.flip), threes(&packet.end));
+            let (flip, end, base) = (threes(&packet.flip), threes(&packet.end), threes(&packet.base));
             let (mut cell, mut entered) = (threes(&packet.cell), ints(&packet.entered));
             let (one, zero) = (all(1), all(0));
             let (row, slab) = (all(layer.row as i32), all(layer.slab as i32));
@@ -479,9 +482,9 @@ macro_rules! kernel {
                 let last = [or(cell[0], mask), or(cell[1], mask), or(cell[2], mask)];
                 let far = [add(last[0], one), add(last[1], one), add(last[2], one)];
                 let [tx, ty, tz] = [
-                    times(minus(whole(far[0]), origin[0]), inverse[0]),
-                    times(minus(whole(far[1]), origin[1]), inverse[1]),
-                    times(minus(whole(far[2]), origin[2]), inverse[2]),
+                    times(minus(whole(subtract(far[0], base[0])), origin[0]), inverse[0]),
+                    times(minus(whole(subtract(far[1], base[1])), origin[1]), inverse[1]),
+                    times(minus(whole(subtract(far[2], base[2])), origin[2]), inverse[2]),
                 ];
                 let by_x = and(at_most(tx, ty), at_most(tx, tz));
                 let by_y = without(at_most(ty, tz), by_x);
@@ -496,10 +499,10 @@ macro_rules! kernel {
                 let mut unsure = zero;
                 for a in 0..3 {
                     let place = plus(origin[a], times(direction[a], t));
-                    let near = nearest(minus(place, splat(0.5)));
+                    let near = add(nearest(minus(place, splat(0.5))), base[a]);
                     let aside = least(most(near, cell[a]), last[a]);
                     if SURE {
-                        let within = minus(place, whole(aside));
+                        let within = minus(place, whole(subtract(aside, base[a])));
                         let slack = plus(slack, times(direction[a], blur));
                         let reached = or(less(slack, within), equal(aside, cell[a]));
                         let kept = less(within, minus(splat(1.0), slack));

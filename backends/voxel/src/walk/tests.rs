@@ -8,6 +8,7 @@ use crate::occupancy::Values;
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 use polyptych_core::parallel::OneThread;
 use polyptych_core::scene::Voxels;
+use std::sync::Arc;
 
 struct Random(u64);
 
@@ -34,7 +35,7 @@ fn hash(x: u32, y: u32, z: u32) -> u32 {
     h ^ (h >> 16)
 }
 
-fn ready(voxels: &Voxels) -> Grid {
+fn ready(voxels: &Voxels) -> Arc<Grid> {
     let all = Values::of(|_| true);
     Chunks::default().grid(voxels, all, all, &OneThread)
 }
