@@ -144,7 +144,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(folder);
     std::fs::create_dir_all(folder)?;
     let first: i64 = words.get(1).map_or(Ok(0), |word| word.parse())?;
-    let limits = Limits { chunks: [16, 3, 16], ..Limits::default() };
+    let limits = Limits { chunks: [16, 4, 16], ..Limits::default() };
     let mut flight = Flight {
         world: World::new(Arc::new(Hills), limits),
         scene: scene(),

@@ -1,7 +1,7 @@
 //! What does a model look like as voxels, and how long does it take? Draws a model at a resolution of your choice.
 //!
-//! `cargo run --release -p polyptych-voxel --example voxelized -- MODEL CELLS OUT.png [EYE TARGET]`: a bunny at 48, a
-//! statue at 256, a building at 512. `EYE` and `TARGET` are `x,y,z` in the model's own units.
+//! `cargo run --release -p polyptych-voxel --example voxelized -- MODEL CELLS OUT.png [EYE TARGET UP]`: a bunny at
+//! 48, a statue at 256, a building at 512. `EYE`, `TARGET` and `UP` are `x,y,z` in the model's own units and axes.
 
 use glam::DVec3;
 use polyptych_core::camera::{Camera, Projection};
@@ -30,14 +30,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let (model, cells, out, view) = match &words[..] {
         [model, cells, out] => (model, cells, out, None),
-        [model, cells, out, eye, target] => (model, cells, out, Some((place(eye)?, place(target)?))),
-        _ => return Err("MODEL CELLS OUT.png [EYE TARGET]".into()),
+        [model, cells, out, eye, target, up] => {
+            (model, cells, out, Some((place(eye)?, place(target)?, place(up)?)))
+        }
+        _ => return Err("MODEL CELLS OUT.png [EYE TARGET UP]".into()),
     };
     let scene = Arc::new(load(Path::new(model), &LoadOptions::default())?);
+    let bounds = scene.bounds();
+    println!("{model} fills {:.2} to {:.2}", bounds.min, bounds.max);
     let lens = Projection::Perspective { fov_y: 0.9 };
     let camera = view.map_or_else(
         || scene.cameras[0].1.clone(),
-        |(eye, target)| Camera::look_at(eye, target, DVec3::Y, lens),
+        |(eye, target, up)| Camera::look_at(eye, target, up, lens),
     );
     let (width, height) = (1280, 720);
     // As fine as was asked for, however little of it shows.

@@ -2,6 +2,7 @@
 //! solids that are no mirrors; others are asked of it.
 
 use crate::octet::{NOTHING, Octet};
+use crate::paint::Row;
 use crate::trace::{Shadows, Tracer, Wants, finite};
 use crate::world::Reach;
 use glam::{DVec3, Vec3};
@@ -23,6 +24,21 @@ struct Points<'a> {
     normal: DVec3x8,
     /// Those that are lit here.
     plain: Mask8,
+}
+
+/// Writes pixels of a plane, if the picture has it.
+#[inline(always)]
+fn put<T: Copy>(plane: &mut [T], first: usize, stride: u32, values: &[T]) {
+    if plane.is_empty() {
+        return;
+    }
+    if stride == 1 {
+        plane[first..first + values.len()].copy_from_slice(values);
+        return;
+    }
+    for (place, value) in plane[first..].iter_mut().step_by(stride as usize).zip(values) {
+        *place = *value;
+    }
 }
 
 impl Tracer<'_> {
@@ -65,10 +81,11 @@ impl Tracer<'_> {
         wants: Wants,
         band: &mut Band<'_>,
         channels: Channels,
-        (x, row, count): (u32, u32, u32),
+        place: Row,
     ) {
+        let Row { x, row, stride, count } = place;
+        let count = count as usize;
         let first = (row * band.width + x) as usize;
-        let pixels = first..first + count as usize;
         let points = self.points(octet, channels);
         let seen = octet.seen();
         let environment = &self.world.scene.environment;
@@ -86,42 +103,39 @@ impl Tracer<'_> {
                     // Adding to zero drops the sign of -0, as adding up layers does.
                     *color = if octet.rays.there.has(i) { finite(Vec3::ZERO + own) } else { Vec3::ZERO };
                 }
-                band.color[pixels.clone()].copy_from_slice(&colors[..count as usize]);
+                put(band.color, first, stride, &colors[..count]);
             }
             if wants.shadow {
-                band.shadow[pixels.clone()].copy_from_slice(&lit.shadow[..count as usize]);
+                put(band.shadow, first, stride, &lit.shadow[..count]);
             }
         }
-        if let Some(distance) = band.distance.get_mut(pixels.clone()) {
-            distance.copy_from_slice(&octet.t.round().0[..count as usize]);
-        }
-        if let Some(normal) = band.normal.get_mut(pixels.clone()) {
-            let normals = points.normal.round();
-            for (i, normal) in normal.iter_mut().enumerate() {
-                *normal =
-                    if seen.has(i) { finite(normals.get(i)) } else { Pixel::background(Vec3::ZERO).normal };
+        put(band.distance, first, stride, &octet.t.round().0[..count]);
+        if channels.has(Channel::Normal) {
+            let (given, mut normals) = (points.normal.round(), [Pixel::background(Vec3::ZERO).normal; LANES]);
+            for (i, normal) in normals.iter_mut().enumerate().filter(|(i, _)| seen.has(*i)) {
+                *normal = finite(given.get(i));
             }
+            put(band.normal, first, stride, &normals[..count]);
         }
-        if let Some(id) = band.id.get_mut(pixels.clone()) {
-            for (i, id) in id.iter_mut().enumerate() {
-                *id = self.world.items.get(octet.item[i] as usize).map_or(0, |item| item.object as u32 + 1);
-            }
+        if channels.has(Channel::Id) {
+            let id = |item: u32| self.world.items.get(item as usize).map_or(0, |item| item.object as u32 + 1);
+            put(band.id, first, stride, &octet.item.map(id)[..count]);
         }
-        if let Some(albedo) = band.albedo.get_mut(pixels.clone()) {
+        if channels.has(Channel::Albedo) {
+            let mut albedo = [Vec3::ZERO; LANES];
             for (i, albedo) in albedo.iter_mut().enumerate() {
                 *albedo = finite(points.color.get(i));
             }
+            put(band.albedo, first, stride, &albedo[..count]);
         }
-        if let Some(coverage) = band.coverage.get_mut(pixels) {
-            for (i, coverage) in coverage.iter_mut().enumerate() {
-                *coverage = if seen.has(i) { 1.0 } else { 0.0 };
-            }
+        if channels.has(Channel::Coverage) {
+            put(band.coverage, first, stride, &seen.0.map(|m| (m & 1) as f32)[..count]);
         }
         let others = seen & !points.plain;
         if others.any() {
-            for i in (0..count as usize).filter(|&i| others.has(i)) {
+            for i in (0..count).filter(|&i| others.has(i)) {
                 let pixel = self.color(&octet.rays.one(i), octet.met(i), lights, wants);
-                band.put(x + i as u32, row, &pixel);
+                band.put(x + i as u32 * stride, row, &pixel);
             }
         }
     }

@@ -24,6 +24,21 @@ pub(crate) struct Painter<'a> {
     is_straight: bool,
     wants: Wants,
     channels: Channels,
+    pattern: Pattern,
+}
+
+/// Which pixels are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pattern {
+    /// All of them.
+    Whole,
+    /// Every other one, as the black fields of a board, or the white ones: those whose row and column and `first` sum up
+    /// to an even number.
+    Half {
+        first: u32,
+        /// Whether the others are filled in from their neighbors, or left as they are.
+        fills: bool,
+    },
 }
 
 /// Pixels of a band that are drawn together.
@@ -36,9 +51,24 @@ struct Tile {
 }
 
 impl Tile {
-    /// Lists first columns and rows of neighboring pixels, eight at a time.
-    fn octets(self) -> impl Iterator<Item = (u32, u32)> {
-        (0..self.rows).flat_map(move |row| (0..self.columns).step_by(LANES).map(move |column| (column, row)))
+    /// Lists first columns and rows of pixels that are drawn eight at a time, and how far apart they are.
+    fn octets(self, pattern: Pattern) -> impl Iterator<Item = (u32, u32, u32)> {
+        let stride = if pattern == Pattern::Whole { 1 } else { 2 };
+        (0..self.rows).flat_map(move |row| {
+            let offset = match pattern {
+                Pattern::Whole => 0,
+                Pattern::Half { first, .. } => (self.first_column + self.first_row + row + first) & 1,
+            };
+            (offset..self.columns).step_by(LANES * stride as usize).map(move |column| (column, row, stride))
+        })
+    }
+
+    /// Tells whether a pixel is drawn.
+    fn has(self, pattern: Pattern, x: u32, row: u32) -> bool {
+        match pattern {
+            Pattern::Whole => true,
+            Pattern::Half { first, .. } => (x + self.first_row + row + first).is_multiple_of(2),
+        }
     }
 
     /// Lists the pixels by rows: index in the tile, column in the picture, row in the band.
@@ -112,7 +142,7 @@ fn wants(channels: Channels) -> Wants {
 }
 
 impl<'a> Painter<'a> {
-    pub(crate) fn new(camera: &'a Camera, target: &Framebuffer) -> Self {
+    pub(crate) fn new(camera: &'a Camera, target: &Framebuffer, pattern: Pattern) -> Self {
         Self {
             view: camera.view(target.width(), target.height()),
             is_straight: matches!(
@@ -121,6 +151,7 @@ impl<'a> Painter<'a> {
             ),
             wants: wants(target.channels()),
             channels: target.channels(),
+            pattern,
         }
     }
 
@@ -252,11 +283,14 @@ impl<'a> Painter<'a> {
         let mut octets = [Octet::nothing(nothing); TILE_RAYS / LANES];
         let mut sites = Sites::default();
         let mut seen = 0;
-        for (octet, (column, row)) in octets.iter_mut().zip(tile.octets()) {
+        // A tile of one column has no neighbors to be filled in from.
+        let pattern = if tile.columns > 1 { self.pattern } else { Pattern::Whole };
+        for (octet, (column, row, stride)) in octets.iter_mut().zip(tile.octets(pattern)) {
             let y = f64::from(tile.first_row + row) + 0.5;
-            let x = I32x8::count_from((tile.first_column + column) as i32).to_f64() + F64x8::splat(0.5);
+            let first = I32x8::splat((tile.first_column + column) as i32);
+            let x = (first + I32x8::count_from(0) * I32x8::splat(stride as i32)).to_f64() + F64x8::splat(0.5);
             let (origin, direction, there) = self.view.rays(x, y);
-            let there = there & Mask8::first((tile.columns - column) as usize);
+            let there = there & Mask8::first((tile.columns - column).div_ceil(stride) as usize);
             seen += u64::from(there.count());
             octet.rays = Rays { origin, direction, there };
             tracer.world.meet_octet(octet, reach, bytes, &tracer.counts);
@@ -265,17 +299,12 @@ impl<'a> Painter<'a> {
             }
         }
         let lights = self.lights(tracer, sites.bounds());
-        for (octet, (column, row)) in octets.iter().zip(tile.octets()) {
-            let count = (tile.columns - column).min(LANES as u32);
-            tracer.write(
-                octet,
-                &lights,
-                self.wants,
-                band,
-                self.channels,
-                (tile.first_column + column, row, count),
-            );
+        for (octet, (column, row, stride)) in octets.iter().zip(tile.octets(pattern)) {
+            let count = (tile.columns - column).div_ceil(stride).min(LANES as u32);
+            let place = Row { x: tile.first_column + column, row, stride, count };
+            tracer.write(octet, &lights, self.wants, band, self.channels, place);
         }
+        fill_in(band, tile, pattern);
         tracer.counts.rays.set(tracer.counts.rays.get() + seen);
     }
 
@@ -296,12 +325,49 @@ impl<'a> Painter<'a> {
 
     /// Draws a tile whose rays go too far apart to be bounded together, or that sees many grids.
     fn wide_tile(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
-        for (_, x, row) in tile.pixels() {
+        let pattern = if tile.columns > 1 { self.pattern } else { Pattern::Whole };
+        for (_, x, row) in tile.pixels().filter(|&(_, x, row)| tile.has(pattern, x, row)) {
             // Outside of a fisheye's circle there is nothing to see, not even a background.
             let nothing = Pixel::background(Vec3::ZERO);
             let pixel = self.ray(tile, x, row).map_or(nothing, |ray| tracer.look(&ray, self.wants));
             band.put(x, row, &pixel);
         }
+        fill_in(band, tile, pattern);
+    }
+}
+
+/// Pixels of a row of a band: the first column, how far they are apart, and how many there are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row {
+    pub(crate) x: u32,
+    pub(crate) row: u32,
+    pub(crate) stride: u32,
+    pub(crate) count: u32,
+}
+
+/// Fills in what was not drawn: the mean of the colors on both sides, and all else from one of them. Nothing is taken
+/// from frames before, so that nothing is seen where it is no more.
+fn fill_in(band: &mut Band<'_>, tile: Tile, pattern: Pattern) {
+    let Pattern::Half { fills: true, .. } = pattern else { return };
+    for (_, x, row) in tile.pixels().filter(|&(_, x, row)| !tile.has(pattern, x, row)) {
+        let at = (row * band.width + x) as usize;
+        let left = if x > tile.first_column { at - 1 } else { at + 1 };
+        let right = if x + 1 < tile.first_column + tile.columns { at + 1 } else { at - 1 };
+        if let Some(color) = band.color.get(left).zip(band.color.get(right)).map(|(a, b)| (*a + *b) * 0.5) {
+            band.color[at] = color;
+        }
+        copy(band.distance, left, at);
+        copy(band.normal, left, at);
+        copy(band.id, left, at);
+        copy(band.albedo, left, at);
+        copy(band.shadow, left, at);
+        copy(band.coverage, left, at);
+    }
+}
+
+fn copy<T: Copy>(plane: &mut [T], from: usize, to: usize) {
+    if let Some(&value) = plane.get(from) {
+        plane[to] = value;
     }
 }
 

@@ -4,10 +4,11 @@ use crate::grid::{Chunks, Grid};
 use crate::lamps::Lamp;
 use crate::model::{self, Model};
 use crate::occupancy::Values;
-use crate::paint::{Painter, TILE};
+use crate::paint::{Painter, Pattern, TILE};
 use crate::plan::plan;
 use crate::trace::{Shadows, Tracer};
 use crate::world::{Counts, Item, Numbers, World};
+use polyptych_core::camera::Camera;
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::scene::{AlphaMode, Scene, ShapeKind};
@@ -39,6 +40,19 @@ pub struct Voxel {
     info: BackendInfo,
     ready: Option<Ready>,
     chunks: Chunks,
+    pub(crate) last: Option<Half>,
+    /// Counts frames: which half is drawn first changes from one to the next.
+    pub(crate) halves: u32,
+}
+
+/// What the last frame drew of a picture of which every other pixel is drawn at once.
+#[derive(Clone, Debug)]
+pub(crate) struct Half {
+    /// Of the picture; see [`Framebuffer::stamp`].
+    stamp: u64,
+    camera: Camera,
+    first: u32,
+    is_whole: bool,
 }
 
 #[derive(Debug)]
@@ -50,6 +64,7 @@ struct Ready {
     bounces: u32,
     shadows: Shadows,
     chunks_built: u64,
+    checkerboard: bool,
 }
 
 impl Default for Voxel {
@@ -62,7 +77,7 @@ impl Voxel {
     /// Makes an instance that has nothing prepared.
     #[must_use]
     pub fn new() -> Self {
-        Self { info: info(), ready: None, chunks: Chunks::default() }
+        Self { info: info(), ready: None, chunks: Chunks::default(), last: None, halves: 0 }
     }
 
     fn resolution(&self, need: &Need) -> u32 {
@@ -134,6 +149,15 @@ fn info() -> BackendInfo {
                 quality_axis: true,
             },
             Parameter {
+                name: "checkerboard",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(false),
+                unit: "",
+                help: "Draw every other pixel of a moving picture, and the rest when it rests",
+                tag: "",
+                quality_axis: false,
+            },
+            Parameter {
                 name: "bounces",
                 kind: ParameterKind::Int { min: 0, max: 8 },
                 default: Value::Int(2),
@@ -171,7 +195,7 @@ impl Renderer for Voxel {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
-        self.ready = None;
+        (self.ready, self.last) = (None, None);
         let model = model::build(scene, need, self.resolution(need), converter, control)?;
         self.chunks.begin();
         let (items, grid_bytes) = self.items(&model, control)?;
@@ -197,6 +221,7 @@ impl Renderer for Voxel {
             bounces: need.settings.int(&self.info.parameters, "bounces").clamp(0, 8) as u32,
             shadows: self.shadows(need),
             chunks_built: self.chunks.built,
+            checkerboard: need.settings.bool(&self.info.parameters, "checkerboard"),
         });
         Ok(Prepared { objects: decisions, bytes })
     }
@@ -213,7 +238,21 @@ impl Renderer for Voxel {
     ) -> Result<Report, RenderError> {
         let ready = self.ready.as_ref().ok_or(RenderError::NotPrepared)?;
         let mut phases = Phases::start();
-        let painter = Painter::new(&frame.camera, target);
+        let last = self.last.take();
+        let same = last.filter(|last| Some(last.stamp) == target.stamp() && last.camera == frame.camera);
+        if let Some(last) = same.as_ref().filter(|last| last.is_whole && ready.checkerboard) {
+            // Both halves are there.
+            self.last = Some(last.clone());
+            let counters = [const { None }; 6];
+            return Ok(Report { objects: ready.decisions.clone(), phases, counters, bytes: ready.bytes });
+        }
+        self.halves = self.halves.wrapping_add(1);
+        let pattern = match &same {
+            _ if !ready.checkerboard => Pattern::Whole,
+            Some(last) => Pattern::Half { first: last.first ^ 1, fills: false },
+            None => Pattern::Half { first: self.halves & 1, fills: true },
+        };
+        let painter = Painter::new(&frame.camera, target, pattern);
         let [rays, shadow_rays, steps] = [const { AtomicU64::new(0) }; 3];
         let stopped = AtomicBool::new(false);
         target.for_each_band(control.threads, TILE, &|mut band| {
@@ -237,13 +276,22 @@ impl Renderer for Voxel {
             return Err(RenderError::Cancelled);
         }
         phases.end("trace");
+        if let Pattern::Half { first, fills } = pattern {
+            let half = |stamp| Half { stamp, camera: frame.camera.clone(), first, is_whole: !fills };
+            self.last = target.stamp().map(half);
+        }
+        let filled = if matches!(pattern, Pattern::Half { fills: true, .. }) {
+            u64::from(target.width()) * u64::from(target.height()) / 2
+        } else {
+            0
+        };
         let counter = |name, count| Some(Counter { name, count });
         let counters = [
             counter("rays", rays.into_inner()),
             counter("shadow rays", shadow_rays.into_inner()),
             counter("steps", steps.into_inner()),
             counter("chunks built", ready.chunks_built),
-            None,
+            (filled > 0).then_some(Counter { name: "pixels filled in", count: filled }),
             None,
         ];
         Ok(Report { objects: ready.decisions.clone(), phases, counters, bytes: ready.bytes })
