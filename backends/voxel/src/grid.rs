@@ -52,6 +52,8 @@ pub(crate) struct Grid {
     /// Which bytes may be seen, and which may block light.
     values: [Values; 2],
     voxels: Voxels,
+    /// How many masks of chunks there are; chunks may share them.
+    masks: u64,
 }
 
 impl Grid {
@@ -70,6 +72,15 @@ impl Grid {
         self.seen.bytes() + self.blocking.bytes() + self.voxels.chunks().len() as u64 * 16
     }
 
+    /// Counts the masks that a chunk shares with no other.
+    fn own_masks(&self, index: usize) -> u64 {
+        let [seen, blocking] = [&self.seen.chunks[index], &self.blocking.chunks[index]];
+        let is_one = Arc::ptr_eq(seen, blocking);
+        let is_own =
+            |masks: &Arc<Occupancy>| !masks.is_empty() && Arc::strong_count(masks) == 1 + usize::from(is_one);
+        u64::from(is_own(seen)) + u64::from(!is_one && is_own(blocking))
+    }
+
     /// Returns how many cells of a chunk lie in the grid along each axis.
     fn end(voxels: &Voxels, index: usize) -> [u32; 3] {
         let first = voxels.chunk_origin(index);
@@ -79,6 +90,7 @@ impl Grid {
     /// Takes over a chunk that became another.
     fn update(&mut self, index: usize, chunk: &Chunk, nothing: &Arc<Occupancy>) {
         let end = Self::end(&self.voxels, index);
+        let own = self.own_masks(index);
         let is_one = Arc::ptr_eq(&self.seen.chunks[index], &self.blocking.chunks[index]);
         let [seen, blocking] = self.values;
         let old = self.voxels.chunks()[index].clone();
@@ -106,6 +118,7 @@ impl Grid {
             self.blocking.chunks[index] = if same { self.seen.chunks[index].clone() } else { masks };
         }
         self.voxels.put_chunk(index, chunk.clone());
+        self.masks = (self.masks + self.own_masks(index)).saturating_sub(own);
     }
 }
 
@@ -169,10 +182,7 @@ impl Chunks {
 
     /// Returns the bytes of all masks.
     pub(crate) fn bytes(&self) -> u64 {
-        let layers = self.used.iter().flat_map(|grid| [&grid.seen, &grid.blocking]);
-        let masks = layers.flat_map(|layer| &layer.chunks).filter(|masks| !masks.is_empty());
-        let masks: HashSet<usize> = masks.map(|masks| Arc::as_ptr(masks).addr()).collect();
-        (masks.len() * size_of::<Occupancy>()) as u64
+        self.used.iter().map(|grid| grid.masks).sum::<u64>() * size_of::<Occupancy>() as u64
     }
 
     /// Makes a grid ready; `seen` are the values that may be seen, `blocking` those that may block light.
@@ -192,16 +202,16 @@ impl Chunks {
 
     /// Changes a grid of before, if there is one that most chunks are those of.
     fn edited(&mut self, voxels: &Voxels, values: [Values; 2]) -> Option<Arc<Grid>> {
-        let is_new =
-            |old: &Grid, index: &usize| !voxels.chunks()[*index].is_same(&old.voxels.chunks()[*index]);
-        let all = voxels.chunks().len();
-        let at = self.kept.iter().position(|old| {
+        let changed_of = |old: &Grid| -> Vec<usize> {
+            let pairs = voxels.chunks().iter().zip(old.voxels.chunks()).enumerate();
+            pairs.filter(|(_, (new, old))| !new.is_same(old)).map(|(i, _)| i).take(MOST_EDITED + 1).collect()
+        };
+        let (at, changed) = self.kept.iter().enumerate().find_map(|(at, old)| {
             let is_alike = old.voxels.size() == voxels.size() && old.values == values;
-            is_alike
-                && (0..all).filter(|index| is_new(old, index)).take(MOST_EDITED + 1).count() <= MOST_EDITED
+            let changed = is_alike.then(|| changed_of(old))?;
+            (changed.len() <= MOST_EDITED).then_some((at, changed))
         })?;
         let mut grid = self.kept.swap_remove(at);
-        let changed: Vec<usize> = (0..all).filter(|index| is_new(&grid, index)).collect();
         if !changed.is_empty() {
             let grid = Arc::make_mut(&mut grid);
             for &index in &changed {
@@ -257,7 +267,10 @@ impl Chunks {
                 .map(|r| r.as_ref().and_then(|r| known.get(r)).map_or(&self.nothing, |b| &b[which]).clone())
                 .collect(),
         };
-        Grid { seen: layer(0), blocking: layer(1), values, voxels: voxels.clone() }
+        let (seen, blocking) = (layer(0), layer(1));
+        let masks = seen.chunks.iter().chain(&blocking.chunks).filter(|masks| !masks.is_empty());
+        let masks: HashSet<usize> = masks.map(|masks| Arc::as_ptr(masks).addr()).collect();
+        Grid { seen, blocking, values, voxels: voxels.clone(), masks: masks.len() as u64 }
     }
 }
 

@@ -14,16 +14,16 @@ use std::sync::Arc;
 /// Nanoseconds on one thread of the machine that all back ends' constants were measured on.
 mod nanoseconds {
     /// A pixel.
-    pub(super) const PIXEL: f64 = 10.0;
+    pub(super) const PIXEL: f64 = 6.0;
     /// A ray into a grid, and each doubling of its cells.
-    pub(super) const GRID: f64 = 10.0;
-    pub(super) const DOUBLING: f64 = 14.0;
+    pub(super) const GRID: f64 = 4.0;
+    pub(super) const DOUBLING: f64 = 4.0;
     /// How much longer a ray walks through what it does not end in.
     pub(super) const CLEAR: f64 = 6.0;
     /// A surface, lit.
-    pub(super) const SURFACE: f64 = 70.0;
+    pub(super) const SURFACE: f64 = 25.0;
     /// A light on it.
-    pub(super) const LIGHT: f64 = 30.0;
+    pub(super) const LIGHT: f64 = 10.0;
 }
 
 pub(crate) fn plan(scene: &Scene, need: &Need, resolution: u32, shadows: Shadows) -> Plan {
