@@ -15,7 +15,7 @@
 //! leaves in doubt taken in double; what goes on through glass, or comes from a mirror, goes alone. The parameter `walk`
 //! chooses other numbers.
 //!
-//! Colors are drawn with one sample a pixel, through its middle, whatever number is needed.
+//! Colors are the mean of as many samples as are needed; all else is that of the ray through a pixel's middle.
 
 mod beam;
 mod grid;

@@ -4,7 +4,7 @@ use crate::beam::Bundle;
 use crate::octet::{Bytes, NOTHING, Octet, Rays};
 use crate::trace::{Shadows, Tracer, Wants, finite};
 use crate::world::{LIFT, Reach, World};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection, View};
 use polyptych_core::framebuffer::{Band, Channel, Channels, Framebuffer, Pixel};
 use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
@@ -18,6 +18,7 @@ const TILE_RAYS: usize = (TILE * TILE) as usize;
 const BOUNDED_LAMPS: usize = 4;
 
 /// Draws bands of a picture.
+#[derive(Clone, Copy)]
 pub(crate) struct Painter<'a> {
     view: View<'a>,
     /// Whether the rays of a tile lie between those of its corners.
@@ -25,6 +26,10 @@ pub(crate) struct Painter<'a> {
     wants: Wants,
     channels: Channels,
     pattern: Pattern,
+    /// Where in a pixel its ray goes through.
+    place: DVec2,
+    /// How many rays a pixel's color is the mean of.
+    samples: u32,
 }
 
 /// Which pixels are drawn.
@@ -142,7 +147,7 @@ fn wants(channels: Channels) -> Wants {
 }
 
 impl<'a> Painter<'a> {
-    pub(crate) fn new(camera: &'a Camera, target: &Framebuffer, pattern: Pattern) -> Self {
+    pub(crate) fn new(camera: &'a Camera, target: &Framebuffer, pattern: Pattern, samples: u32) -> Self {
         Self {
             view: camera.view(target.width(), target.height()),
             is_straight: matches!(
@@ -152,6 +157,8 @@ impl<'a> Painter<'a> {
             wants: wants(target.channels()),
             channels: target.channels(),
             pattern,
+            place: DVec2::splat(0.5),
+            samples,
         }
     }
 
@@ -184,22 +191,100 @@ impl<'a> Painter<'a> {
             }
             let columns = TILE.min(band.width - first_column);
             let tile = Tile { first_column, columns, first_row: band.first_row, rows: band.rows };
-            match self.reach(tracer, tile) {
-                Some(reach) if reach.is_empty() => self.empty_tile(tracer, band, tile),
-                Some(reach) => self.tile(tracer, band, tile, &reach),
-                None => self.wide_tile(tracer, band, tile),
+            self.draw(tracer, band, tile);
+            if self.samples > 1 {
+                self.smooth(tracer, band, tile);
             }
         }
         true
+    }
+
+    #[inline(always)]
+    fn draw(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
+        match self.reach(tracer, tile) {
+            Some(reach) if reach.is_empty() => self.empty_tile(tracer, band, tile),
+            Some(reach) => self.tile(tracer, band, tile, &reach),
+            None => self.wide_tile(tracer, band, tile),
+        }
+    }
+
+    /// Puts the mean of many rays in the place of a tile's colors, and of its coverage. They go through places that a
+    /// golden section spreads evenly over the pixel, the same in each, so that nothing flickers.
+    #[inline(always)]
+    fn smooth(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let (mut colors, mut covers) = ([Vec3::ZERO; TILE_RAYS], [0.0f32; TILE_RAYS]);
+        let (mut color, mut cover) = (colors, covers);
+        let channels = Channels::NONE.with(Channel::Coverage);
+        let channels = if self.wants.color { channels.with(Channel::Color) } else { channels };
+        let corner = DVec2::new(f64::from(tile.first_column), f64::from(tile.first_row));
+        let part = Tile { first_column: 0, first_row: 0, ..tile };
+        for i in 0..self.samples {
+            let along = (f64::from(i) + 0.5) / f64::from(self.samples);
+            let place = corner + DVec2::new(along, ((f64::from(i) + 0.5) * GOLDEN).fract());
+            let wants = Wants { shadow: false, ..self.wants };
+            let sampler = Self { place, wants, channels, pattern: Pattern::Whole, samples: 1, ..*self };
+            let mut sample = Band {
+                width: TILE,
+                first_row: 0,
+                rows: tile.rows,
+                color: if self.wants.color { &mut color } else { &mut [] },
+                distance: &mut [],
+                normal: &mut [],
+                id: &mut [],
+                albedo: &mut [],
+                shadow: &mut [],
+                coverage: &mut cover,
+            };
+            sampler.draw_sample(tracer, &mut sample, part);
+            for (sum, sample) in colors.iter_mut().zip(color) {
+                *sum += sample;
+            }
+            for (sum, sample) in covers.iter_mut().zip(cover) {
+                *sum += sample;
+            }
+        }
+        let share = 1.0 / self.samples as f32;
+        for (i, x, row) in tile.pixels() {
+            let at = (row * band.width + x) as usize;
+            if let Some(color) = band.color.get_mut(at) {
+                *color = finite(colors[i] * share);
+            }
+            if let Some(coverage) = band.coverage.get_mut(at) {
+                *coverage = covers[i] * share;
+            }
+        }
+    }
+
+    /// Draws a tile in a function of its own: the kernel is large, and need not be there twice.
+    #[inline(never)]
+    fn draw_sample(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("bmi2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for processor features can only be called so"
+            )]
+            // SAFETY: the processor has the features that the kernel was compiled for; it was just asked.
+            return unsafe { self.draw_avx2(tracer, band, tile) };
+        }
+        self.draw(tracer, band, tile);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn draw_avx2(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
+        self.draw(tracer, band, tile);
     }
 
     /// Sets up the rays of all pixels of a tile.
     #[inline(always)]
     fn rays(&self, tile: Tile, rays: &mut [Option<Ray>; TILE_RAYS]) {
         for row in 0..tile.rows {
-            let y = f64::from(tile.first_row + row) + 0.5;
+            let y = f64::from(tile.first_row + row) + self.place.y;
             for column in (0..tile.columns).step_by(LANES) {
-                let x = I32x8::count_from((tile.first_column + column) as i32).to_f64() + F64x8::splat(0.5);
+                let x = I32x8::count_from((tile.first_column + column) as i32).to_f64()
+                    + F64x8::splat(self.place.x);
                 let (origin, direction, there) = self.view.rays(x, y);
                 for i in 0..LANES {
                     let ray = Ray { origin: origin.get(i), direction: direction.get(i) };
@@ -211,7 +296,7 @@ impl<'a> Painter<'a> {
 
     #[inline(always)]
     fn ray(&self, tile: Tile, x: u32, row: u32) -> Option<Ray> {
-        self.view.ray(f64::from(x) + 0.5, f64::from(tile.first_row + row) + 0.5)
+        self.view.ray(f64::from(x) + self.place.x, f64::from(tile.first_row + row) + self.place.y)
     }
 
     /// Finds what the rays of a tile may meet.
@@ -286,9 +371,10 @@ impl<'a> Painter<'a> {
         // A tile of one column has no neighbors to be filled in from.
         let pattern = if tile.columns > 1 { self.pattern } else { Pattern::Whole };
         for (octet, (column, row, stride)) in octets.iter_mut().zip(tile.octets(pattern)) {
-            let y = f64::from(tile.first_row + row) + 0.5;
+            let y = f64::from(tile.first_row + row) + self.place.y;
             let first = I32x8::splat((tile.first_column + column) as i32);
-            let x = (first + I32x8::count_from(0) * I32x8::splat(stride as i32)).to_f64() + F64x8::splat(0.5);
+            let x = (first + I32x8::count_from(0) * I32x8::splat(stride as i32)).to_f64()
+                + F64x8::splat(self.place.x);
             let (origin, direction, there) = self.view.rays(x, y);
             let there = there & Mask8::first((tile.columns - column).div_ceil(stride) as usize);
             seen += u64::from(there.count());

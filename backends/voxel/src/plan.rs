@@ -26,7 +26,7 @@ mod nanoseconds {
     pub(super) const LIGHT: f64 = 10.0;
 }
 
-pub(crate) fn plan(scene: &Scene, need: &Need, resolution: u32, shadows: Shadows) -> Plan {
+pub(crate) fn plan(scene: &Scene, need: &Need, [resolution, samples]: [u32; 2], shadows: Shadows) -> Plan {
     let lamps = Lamp::all(scene);
     let (mut known, mut cells) = (HashSet::new(), vec![0.0; scene.objects.len()]);
     let objects: Vec<ObjectPlan> = scene
@@ -45,11 +45,16 @@ pub(crate) fn plan(scene: &Scene, need: &Need, resolution: u32, shadows: Shadows
     let mut passes = vec![PassPlan {
         name: "primary rays".to_owned(),
         needed: true,
-        why: "one through the middle of each pixel".to_owned(),
+        why: match samples {
+            1 => "one through the middle of each pixel".to_owned(),
+            _ => format!("one through the middle of each pixel, and {samples} for its color"),
+        },
     }];
     passes.extend(demand.passes());
     passes.push(demand.shadow_rays());
-    Plan { estimated_ms: milliseconds(scene, need, &demand, &cells), objects, passes, bytes }
+    let rays = if samples > 1 { samples + 1 } else { 1 };
+    let estimated_ms = milliseconds(scene, need, &demand, &cells) * f64::from(rays);
+    Plan { estimated_ms, objects, passes, bytes }
 }
 
 /// `cells` are those along the longest edge of each object's grid.

@@ -45,6 +45,9 @@ pub struct Voxel {
     pub(crate) halves: u32,
 }
 
+/// Most rays for the color of a pixel.
+const MOST_SAMPLES: i64 = 64;
+
 /// What the last frame drew of a picture of which every other pixel is drawn at once.
 #[derive(Clone, Debug)]
 pub(crate) struct Half {
@@ -65,6 +68,7 @@ struct Ready {
     shadows: Shadows,
     chunks_built: u64,
     checkerboard: bool,
+    samples: u32,
 }
 
 impl Default for Voxel {
@@ -91,6 +95,11 @@ impl Voxel {
             "fixed" => Numbers::Fixed,
             _ => Numbers::Exact,
         }
+    }
+
+    fn samples(&self, need: &Need) -> u32 {
+        let asked = need.settings.int(&self.info.parameters, "samples").clamp(1, MOST_SAMPLES) as u32;
+        need.samples.max(asked).min(MOST_SAMPLES as u32)
     }
 
     fn shadows(&self, need: &Need) -> Shadows {
@@ -149,11 +158,20 @@ fn info() -> BackendInfo {
                 quality_axis: true,
             },
             Parameter {
+                name: "samples",
+                kind: ParameterKind::Int { min: 1, max: MOST_SAMPLES },
+                default: Value::Int(1),
+                unit: "",
+                help: "Rays that the color of a pixel is the mean of",
+                tag: "samples",
+                quality_axis: true,
+            },
+            Parameter {
                 name: "checkerboard",
                 kind: ParameterKind::Bool,
                 default: Value::Bool(false),
                 unit: "",
-                help: "Draw every other pixel of a moving picture, and the rest when it rests",
+                help: "Draw every other pixel of a moving picture, and the rest when it rests; with one sample",
                 tag: "",
                 quality_axis: false,
             },
@@ -185,7 +203,7 @@ impl Renderer for Voxel {
     }
 
     fn plan(&self, scene: &Scene, need: &Need) -> Plan {
-        plan(scene, need, self.resolution(need), self.shadows(need))
+        plan(scene, need, [self.resolution(need), self.samples(need)], self.shadows(need))
     }
 
     fn prepare(
@@ -221,7 +239,10 @@ impl Renderer for Voxel {
             bounces: need.settings.int(&self.info.parameters, "bounces").clamp(0, 8) as u32,
             shadows: self.shadows(need),
             chunks_built: self.chunks.built,
-            checkerboard: need.settings.bool(&self.info.parameters, "checkerboard"),
+            // Many rays a pixel are for pictures that rest.
+            checkerboard: need.settings.bool(&self.info.parameters, "checkerboard")
+                && self.samples(need) == 1,
+            samples: self.samples(need),
         });
         Ok(Prepared { objects: decisions, bytes })
     }
@@ -252,7 +273,7 @@ impl Renderer for Voxel {
             Some(last) => Pattern::Half { first: last.first ^ 1, fills: false },
             None => Pattern::Half { first: self.halves & 1, fills: true },
         };
-        let painter = Painter::new(&frame.camera, target, pattern);
+        let painter = Painter::new(&frame.camera, target, pattern, ready.samples);
         let [rays, shadow_rays, steps] = [const { AtomicU64::new(0) }; 3];
         let stopped = AtomicBool::new(false);
         target.for_each_band(control.threads, TILE, &|mut band| {

@@ -424,3 +424,30 @@ fn a_board_of_pixels_is_whole_at_rest_and_without_ghosts_in_motion() {
         }
     }
 }
+
+#[test]
+fn many_samples_are_the_mean_of_small_pixels() {
+    // A wall behind the left of 5.25 pixels: the sixth is covered by a quarter.
+    let voxels = Voxels::from_fn([21, 128, 1], |_, _, _| 1);
+    let mut scene = scene(voxels, vec![Material { emission: Vec3::ONE, ambient: 0.0, ..matte(Vec3::ZERO) }]);
+    scene.objects[0].world_from_object = DAffine3::from_scale(DVec3::splat(0.25));
+    let picture = |samples: &str, threads: usize| {
+        let mut need = need(from_front(), 32, 32);
+        need.settings.set("voxel", &Factory.info().parameters, "samples", samples).unwrap();
+        let mut voxel = Voxel::new();
+        voxel.prepare(&Arc::new(scene.clone()), &need, &Converter::default(), &Control::simple()).unwrap();
+        let mut picture = Framebuffer::new(32, 32, Channels::ALL);
+        let pool = Pool::new(threads).unwrap();
+        voxel.render(&need.frame(), &mut picture, &Control::new(&pool)).unwrap();
+        picture
+    };
+    let (one, many) = (picture("1", 1), picture("16", 1));
+    assert!(many.same_bits(&picture("16", 3)));
+    for (x, share) in [(0, 1.0), (4, 1.0), (5, 0.25), (6, 0.0), (31, 0.0)] {
+        for y in [0, 7, 31] {
+            let i = y * 32 + x;
+            assert_eq!((many.coverage()[i], many.color()[i]), (share, Vec3::splat(share)), "{x}, {y}");
+            assert_eq!(many.distance()[i], one.distance()[i]);
+        }
+    }
+}
