@@ -5,7 +5,7 @@ mod common;
 use common::studio;
 use polyptych::framebuffer::{Channel, Channels};
 use polyptych::prelude::*;
-use polyptych::scene::{Primitive, texture_lookups};
+use polyptych::scene::{Mesh, NormalMap, Primitive, texture_lookups};
 use std::sync::Arc;
 
 const SIZE: [u32; 2] = [96, 64];
@@ -57,4 +57,38 @@ fn textures_are_read_once_where_they_are_seen_and_never_elsewhere() {
         let shape = Channels::of(&[Channel::Distance, Channel::Normal, Channel::Id]);
         assert_eq!(lookups(&seen, shape).0, 0, "{backend}: nobody asks for its color");
     }
+    let map = relief();
+    for backend in ["reference", "raster"] {
+        let mut studio = studio(1);
+        let mut lookups = |channels: &[Channel]| {
+            let channels = Channels::of(channels);
+            let need = Need { channels, ..Need::new(map.cameras[0].1.clone(), SIZE[0], SIZE[1]) };
+            studio.prepare(backend, &map, &need).unwrap();
+            let before = texture_lookups();
+            studio.render(backend, &need.frame(), &mut Framebuffer::new(SIZE[0], SIZE[1], channels)).unwrap();
+            texture_lookups() - before
+        };
+        for sees in [Channel::Color, Channel::Normal] {
+            assert!(lookups(&[sees]) > 500, "{backend}: {sees:?} is seen to be turned");
+        }
+        let others = [Channel::Distance, Channel::Id, Channel::Albedo, Channel::Shadow];
+        assert_eq!(lookups(&others), 0, "{backend}: nobody asks for a normal");
+    }
+}
+
+/// A square with a normal map.
+fn relief() -> Arc<Scene> {
+    let mut scene = (*scene(-2.0)).clone();
+    let texture = scene.add_texture(Texture::from_linear8("relief", 1, 1, &[200, 128, 230, 255]));
+    let map = Some(NormalMap { texture, scale: 1.0 });
+    let bumpy = scene.add_material(Material { normal_map: map, ..Material::new(Vec3::ONE) });
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let mesh = Mesh {
+        positions: corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec(),
+        uvs: corners.map(|[x, y]| [x, -y].into()).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    scene.objects = vec![Object::new("relief", Shape::Mesh(mesh), bumpy)];
+    Arc::new(scene)
 }

@@ -282,6 +282,12 @@ fn textures_lie_the_right_way_up() {
     let top_left = mesh.uvs.iter().position(|uv| uv.length() < 1e-6).unwrap();
     let (p, bounds) = (mesh.positions[top_left], mesh.bounds());
     assert!(f64::from(p.y) > bounds.center().y && f64::from(p.x) < bounds.center().x, "{p}");
+    let scene = open(&models, "gltf/own/normal_map_vs_sphere.glb");
+    let map = scene.materials.iter().find_map(|m| m.normal_map).unwrap();
+    // The middle of the picture of a ball looks ahead, its right to the right, its upper half up.
+    let texel = |u, v| scene.textures[map.texture].sample([u, v], 0.0).truncate() * 2.0 - 1.0;
+    assert!((texel(0.5, 0.5) - glam::Vec3::Z).length() < 0.05, "{}", texel(0.5, 0.5));
+    assert!(texel(0.7, 0.5).x > 0.2 && texel(0.5, 0.3).y > 0.2, "{} {}", texel(0.7, 0.5), texel(0.5, 0.3));
     for file in ["mesh/spot/spot.obj", "mesh/spider/spider.obj", "mesh/duck/duck.obj", "mesh/fuze/fuze.obj"] {
         let scene = open(&models, file);
         assert!(!scene.textures.is_empty() && scene.textures.iter().all(|t| t.size() != [64, 64]), "{file}");

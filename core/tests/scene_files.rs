@@ -4,8 +4,8 @@ use glam::{DAffine3, DVec2, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::load::{LoadOptions, SceneFile, json_schema, load, save};
 use polyptych_core::scene::{
-    Form, FreeForm, HeightField, Light, LightKind, Material, Mesh, Object, Perturbation, Power, Primitive,
-    Samples, Scene, Shape, Texture, Volume, Voxels,
+    Form, FreeForm, HeightField, Light, LightKind, Material, Mesh, NormalMap, Object, Perturbation, Power,
+    Primitive, Samples, Scene, Shape, Texture, Volume, Voxels,
 };
 use std::path::PathBuf;
 
@@ -39,6 +39,8 @@ fn everything() -> Scene {
     let red = scene.add_material(Material { name: "red".into(), ..Material::new(Vec3::new(0.5, 0.01, 0.0)) });
     let twin =
         scene.add_material(Material { name: "red".into(), texture: Some(picture), ..Material::default() });
+    let bumps = scene.add_texture(Texture::from_linear8("bumps", 3, 2, &rgba));
+    scene.materials[red].normal_map = Some(NormalMap { texture: bumps, scale: 0.5 });
     let blob = Form::Perturbed {
         base: Box::new(Form::Ellipsoid { center: DVec3::ZERO, radii: DVec3::new(1.0, 0.5, 1.0) }),
         terms: vec![Perturbation {
@@ -117,8 +119,19 @@ fn every_shape_reads_back_as_it_was_written() {
         assert!(read.material(&read.objects[1], 1).texture.is_some());
         for x in 0..3 {
             let uv = [(x as f32 + 0.5) / 3.0, 0.75];
-            assert_eq!(read.textures[0].sample(uv, 0.0), scene.textures[0].sample(uv, 0.0));
+            for (old, new) in scene.materials.iter().zip(&read.materials) {
+                let textures = |m: &Material| [m.texture, m.normal_map.map(|map| map.texture)];
+                for (old, new) in textures(old).into_iter().zip(textures(new)) {
+                    let texel =
+                        |scene: &Scene, of: Option<usize>| of.map(|t| scene.textures[t].sample(uv, 0.0));
+                    assert_eq!(texel(&read, new), texel(&scene, old));
+                }
+            }
         }
+        let maps =
+            |scene: &Scene| scene.materials.iter().map(|m| m.normal_map.map(|map| map.scale)).collect();
+        let (old, new): (Vec<_>, Vec<_>) = (maps(&scene), maps(&read));
+        assert_eq!(old, new);
         assert_eq!(read.lights[0], scene.lights[0]);
         let LightKind::Spot { inner, outer, .. } = read.lights[1].kind else { panic!("not a spot") };
         assert!((inner - 0.25).abs() < 1e-12 && (outer - 0.5).abs() < 1e-12 && !read.lights[1].casts_shadow);
@@ -226,6 +239,13 @@ fn wrong_scenes_say_what_is_wrong_where_and_what_to_do() {
         ("n.json", "[".repeat(100_000), &["line 1"]),
         ("o.ron", object(&format!("FreeForm(form: {}", "Offset(amount: 0, form: ".repeat(50_000))), &["line 1"]),
         ("p.ron", object("HeightField(rows: [[0, 0], [0]])"), &["row 1 has 1 heights, row 0 has 2"]),
+        (
+            "r.ron",
+            "(textures: {\"t\": Checker(colors: (\"#fff\", \"#000\"))}, \
+             materials: {\"m\": (texture: \"t\", normal_map: (texture: \"t\"))}, objects: [])"
+                .to_owned(),
+            &["texture `t` is used for colors and for normals", "name its file twice"],
+        ),
         ("q.ron", "(objects: [(shape: Primitive(Sphere(radius: 1)), transform: (scale: 0))])".to_owned(), &["squeezes"]),
     ] {
         let error = folder.load(name, &text).expect_err(name);

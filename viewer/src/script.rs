@@ -98,6 +98,16 @@ fn step(line: &str) -> Option<Step> {
     })
 }
 
+/// How long a script that waits for pictures leaves the window alone.
+const PAUSE: Duration = Duration::from_millis(50);
+
+impl Running {
+    /// Tells whether nothing goes on but what painters do.
+    fn waits(&self) -> bool {
+        self.count > 2 && matches!(self.step, Step::Wait | Step::Open(_) | Step::Shot(_))
+    }
+}
+
 impl Viewer {
     /// Has a script do what a user would.
     pub fn follow(&mut self, script: Script) {
@@ -107,7 +117,11 @@ impl Viewer {
 
     pub(crate) fn follow_script(&mut self, ctx: &Context) {
         let Some(mut script) = self.script.take() else { return };
-        ctx.request_repaint();
+        match &script.running {
+            // Whoever only looks at the window takes no time from those who draw.
+            Some(running) if running.waits() => ctx.request_repaint_after(PAUSE),
+            _ => ctx.request_repaint(),
+        }
         if let Some(read) = script.read.take() {
             println!("first frame after {:.2} s", read.elapsed().as_secs_f64());
         }

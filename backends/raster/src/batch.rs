@@ -54,6 +54,15 @@ pub(crate) struct Batch<'a> {
 /// The index of triangles that need no face.
 pub(crate) const NO_FACE: u16 = u16::MAX;
 
+/// How the points of a batch are to be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Manner {
+    pub(crate) ask: Ask,
+    pub(crate) shading: Shading,
+    /// Whether normal maps turn normals.
+    pub(crate) turns: bool,
+}
+
 /// What is asked of a point beyond its place and normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ask {
@@ -135,10 +144,10 @@ impl<'a> Batch<'a> {
         model: &Model,
         lens: &Lens,
         faces: &[Face],
-        (ask, shading): (Ask, Shading),
+        manner: Manner,
     ) {
-        if !(self.is_one && self.resolve_one(scene, model, lens, faces, (ask, shading))) {
-            self.resolve_each(scene, model, lens, (ask, shading));
+        if !(self.is_one && self.resolve_one(scene, model, lens, faces, manner)) {
+            self.resolve_each(scene, model, lens, manner);
         }
         self.straighten();
     }
@@ -151,8 +160,9 @@ impl<'a> Batch<'a> {
         model: &Model,
         lens: &Lens,
         faces: &[Face],
-        (ask, shading): (Ask, Shading),
+        manner: Manner,
     ) -> bool {
+        let Manner { ask, shading, turns } = manner;
         let face = &faces[usize::from(self.face[0])];
         let Some(met) = face.meet_all(lens, self.x, self.y) else { return false };
         self.t = met.t;
@@ -168,14 +178,17 @@ impl<'a> Batch<'a> {
         let material = face.material(scene, model);
         self.material = [Some(material); LANES];
         self.has_one_material = true;
-        if ask == Ask::Color {
-            let part = &model.parts[face.part as usize];
-            if part.has_one_color(material) {
-                self.fill_color(material);
-            } else {
-                let changes = face.changes(lens, self.x, self.y, &met);
-                self.paint((scene, model), &met.weights, Some(&changes));
-            }
+        let has_one_color = model.parts[face.part as usize].has_one_color(material);
+        let turns = turns && material.normal_map.is_some();
+        let paints = ask == Ask::Color && !has_one_color;
+        let changes = (turns || paints).then(|| face.changes(lens, self.x, self.y, &met));
+        if paints {
+            self.paint((scene, model), &met.weights, changes.as_ref());
+        } else if ask == Ask::Color {
+            self.fill_color(material);
+        }
+        if turns {
+            self.turn((scene, model), &met.weights, changes.as_ref());
         }
         self.reach(lens);
         true
@@ -183,12 +196,14 @@ impl<'a> Batch<'a> {
 
     /// Finds the points of pixels that show a triangle each.
     #[inline(always)]
-    fn resolve_each(&mut self, scene: &'a Scene, model: &Model, lens: &Lens, (ask, shading): (Ask, Shading)) {
+    fn resolve_each(&mut self, scene: &'a Scene, model: &Model, lens: &Lens, manner: Manner) {
+        let Manner { ask, shading, turns } = manner;
         let octet = Octet::of(model, lens.origin, &self.names, self.count, shading != Shading::Flat);
         self.find_materials(scene, model);
-        let paints = ask == Ask::Color
-            && self.material[..self.count].iter().flatten().any(|material| material.texture.is_some());
-        let met = octet.meet(lens, self.x, self.y, paints);
+        let materials = || self.material[..self.count].iter().flatten();
+        let paints = ask == Ask::Color && materials().any(|material| material.texture.is_some());
+        let turns = turns && materials().any(|material| material.normal_map.is_some());
+        let met = octet.meet(lens, self.x, self.y, paints || turns);
         self.t = met.t;
         self.weights = [met.weights[0].round(), met.weights[1].round()];
         (self.true_normal, self.normal) = (met.true_normal, met.normal);
@@ -219,6 +234,9 @@ impl<'a> Batch<'a> {
                 Some(material) => self.fill_color(material),
                 None => self.paint((scene, model), &weights, changes.as_ref()),
             }
+        }
+        if turns {
+            self.turn((scene, model), &weights, changes.as_ref());
         }
         self.reach(lens);
         for i in (0..self.count).filter(|_| any_held) {
@@ -252,16 +270,39 @@ impl<'a> Batch<'a> {
     ) {
         for i in 0..self.count {
             let Some(material) = self.material[i] else { continue };
-            let spot = Spot {
-                scene,
-                part: &model.parts[self.names.part[i] as usize],
-                triangle: self.names.triangle[i] as usize,
-                weights: [weights[0].0[i], weights[1].0[i]],
-                changes: changes.map_or(Changes::NONE, |changes| changes.of(i)),
-            };
-            let (color, opacity) = spot.color(material);
+            let (color, opacity) = self.spot((scene, model), weights, changes, i).color(material);
             self.opacity[i] = opacity;
             self.color.set(i, color);
+        }
+    }
+
+    /// Turns the normal of each place that has a normal map.
+    #[inline(always)]
+    fn turn(&mut self, of: (&Scene, &Model), weights: &[F64x8; 2], changes: Option<&ChangesAll>) {
+        self.straighten();
+        for i in 0..self.count {
+            if let Some(map) = self.material[i].and_then(|material| material.normal_map.as_ref()) {
+                let spot = self.spot(of, weights, changes, i);
+                let normals = (self.normal.get(i), self.true_normal.get(i).as_vec3());
+                self.normal.set(i, spot.turned(map, normals.0, normals.1));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn spot<'s>(
+        &self,
+        (scene, model): (&'s Scene, &'s Model),
+        weights: &[F64x8; 2],
+        changes: Option<&ChangesAll>,
+        i: usize,
+    ) -> Spot<'s> {
+        Spot {
+            scene,
+            part: &model.parts[self.names.part[i] as usize],
+            triangle: self.names.triangle[i] as usize,
+            weights: [weights[0].0[i], weights[1].0[i]],
+            changes: changes.map_or(Changes::NONE, |changes| changes.of(i)),
         }
     }
 

@@ -1,6 +1,6 @@
 //! From triangles in tiles to pixels: visibility, then the surfaces that are seen, then their light.
 
-use crate::batch::{Ask, Batch, NO_FACE};
+use crate::batch::{Ask, Batch, Manner, NO_FACE};
 use crate::bin::Bins;
 use crate::drawing::Drawing;
 use crate::face::Faces;
@@ -32,10 +32,9 @@ pub(crate) struct Painter<'a> {
     pub(crate) bins: &'a Bins,
     /// The lines to draw instead of light.
     pub(crate) drawing: Option<Drawing<'a>>,
-    shading: Shading,
     pub(crate) places: &'a [[i32; 2]],
     pub(crate) wants: Wants,
-    ask: Ask,
+    manner: Manner,
     pub(crate) channels: Channels,
 }
 
@@ -92,7 +91,11 @@ impl<'a> Painter<'a> {
         };
         // Opacity decides what is seen first, so it is asked for wherever there are layers.
         let ask = if wants.color || channels.has(Channel::Albedo) { Ask::Color } else { Ask::Geometry };
-        Self { light, lens, bins, drawing, shading, places, wants, ask, channels }
+        let turns = shading == Shading::Phong
+            && (wants.color || channels.has(Channel::Normal))
+            && light.scene.materials.iter().any(|material| material.normal_map.is_some());
+        let manner = Manner { ask, shading, turns };
+        Self { light, lens, bins, drawing, places, wants, manner, channels }
     }
 
     /// Draws all bands, each with scratch memory of its own. Returns how many pixels were shaded.
@@ -300,7 +303,7 @@ impl<'a> Painter<'a> {
     pub(crate) fn add(&self, batch: &mut Batch<'a>, faces: &mut Faces, place: (f64, f64), id: u32, tag: u32) {
         let model = self.light.model;
         let part = model.part_near(batch.last_part(), id);
-        let face = if self.shading == Shading::Gouraud { self.find(faces, id) } else { NO_FACE };
+        let face = if self.manner.shading == Shading::Gouraud { self.find(faces, id) } else { NO_FACE };
         batch.push(place, [id, part as u32, id - model.parts[part].first_triangle], face, tag);
     }
 
@@ -329,8 +332,9 @@ impl<'a> Painter<'a> {
         let light = &self.light;
         // Opacity decides what is seen first.
         let layered = batch.tag[..batch.count].iter().any(|tag| tag & LAYER != 0);
-        let ask = if layered { Ask::Color } else { self.ask };
-        batch.resolve(light.scene, light.model, self.lens, &faces.faces, (ask, self.shading));
+        let ask = if layered { Ask::Color } else { self.manner.ask };
+        let manner = Manner { ask, ..self.manner };
+        batch.resolve(light.scene, light.model, self.lens, &faces.faces, manner);
         if self.drawing.is_some() {
             // Surfaces have the color of the paper.
             let background = &light.scene.environment.background;
@@ -341,7 +345,7 @@ impl<'a> Painter<'a> {
             return;
         }
         if self.wants.color || self.wants.shadow {
-            let interpolated = self.wants.color && self.shading == Shading::Gouraud;
+            let interpolated = self.wants.color && self.manner.shading == Shading::Gouraud;
             if interpolated {
                 corners.light(light, self.lens, faces);
             }

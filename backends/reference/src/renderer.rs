@@ -318,6 +318,7 @@ impl Painter<'_> {
             .any(|&c| self.channels.has(c));
         let center = Wants {
             color: color && samples <= 1,
+            normal: self.channels.has(Channel::Normal),
             albedo: self.channels.has(Channel::Albedo),
             shadow: self.channels.has(Channel::Shadow),
         };
@@ -330,7 +331,7 @@ impl Painter<'_> {
             let (mut sum, mut hits) = (glam::DVec3::ZERO, 0u32);
             for sample in 0..samples {
                 let place = place_in_pixel(x, y, sample, samples);
-                let wants = Wants { color, albedo: false, shadow: false };
+                let wants = Wants { color, normal: false, albedo: false, shadow: false };
                 let seen = self.sample(tracer, x, y, place, wants);
                 sum += seen.color.as_dvec3();
                 hits += u32::from(seen.id != 0);

@@ -11,6 +11,7 @@ use polyptych_core::shade::{Surface, turned_away};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Wants {
     pub(crate) color: bool,
+    pub(crate) normal: bool,
     pub(crate) albedo: bool,
     pub(crate) shadow: bool,
 }

@@ -60,7 +60,7 @@ impl Tracer<'_> {
                 layers.color += background.as_dvec3() * layers.clear;
                 break;
             };
-            let point = world.point(ray, start, &met, wants.color || wants.albedo);
+            let point = world.point(ray, start, &met, wants);
             let asked = Wants { shadow: wants.shadow && first.is_none(), ..wants };
             let lit = if asked.color || asked.shadow {
                 self.light(&point, -ray.direction, asked)
@@ -96,7 +96,7 @@ impl Tracer<'_> {
         let incoming = ray.direction.dot(point.normal);
         let direction = (ray.direction - point.normal * (2.0 * incoming)).normalize_or(point.true_normal);
         let mirror = Ray { origin: point.position + point.true_normal * point.lift, direction };
-        let wants = Wants { color: true, albedo: false, shadow: false };
+        let wants = Wants { color: true, normal: false, albedo: false, shadow: false };
         let seen = self.follow(&mirror, Start::Surface, wants, bounces - 1, weight);
         color.lerp(seen.color, share)
     }

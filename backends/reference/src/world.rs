@@ -4,10 +4,11 @@ use crate::bvh::{Bounded, Bvh};
 use crate::lights::Lamp;
 use crate::line::{Hit, Line, Span, Start};
 use crate::march::Cloud;
-use crate::shapes::Geometry;
+use crate::shade::Wants;
+use crate::shapes::{Finish, Geometry};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use polyptych_core::math::{Aabb, Ray};
-use polyptych_core::scene::{AlphaMode, Material, Scene};
+use polyptych_core::scene::{AlphaMode, Material, NormalMap, Scene, Shape};
 use std::sync::Arc;
 
 /// A scene made ready to be met by rays.
@@ -192,8 +193,8 @@ impl World {
         }
     }
 
-    /// Returns material, base color, effective opacity and shading normal (object space) at a hit.
-    fn look_up(&self, item: &Item, line: &Line, hit: &Hit) -> (&Material, Vec3, f32, DVec3) {
+    /// Returns material, base color, effective opacity, and what else is there at a hit.
+    fn look_up(&self, item: &Item, line: &Line, hit: &Hit) -> (&Material, Vec3, f32, Finish) {
         let scene = &*self.scene;
         let material = scene.material(&scene.objects[item.object], hit.slot);
         let position = line.at(hit.t);
@@ -201,34 +202,47 @@ impl World {
         let normal = hit.normal.normalize_or_zero().as_vec3();
         let (color, opacity) = scene.base_color(material, finish.uv, position.as_vec3(), normal, 0.0);
         let opacity = material.effective_opacity(opacity).min(1.0);
-        (material, color * finish.color, opacity, finish.normal)
+        (material, color * finish.color, opacity, finish)
     }
 
     /// Returns what shading needs of the surface that a ray met. Without anyone to see its color no texture is read for
-    /// it: color and opacity are then the material's own.
-    pub(crate) fn point(&self, ray: &Ray, start: Start, met: &Met<'_>, reads_color: bool) -> Point<'_> {
+    /// it: color and opacity are then the material's own. Nor is a normal map that nobody sees.
+    pub(crate) fn point(&self, ray: &Ray, start: Start, met: &Met<'_>, wants: Wants) -> Point<'_> {
         let item = met.item;
         let line = item.line(ray, start);
-        let (material, color, opacity, smooth) = if reads_color {
+        let (material, color, opacity, finish) = if wants.color || wants.albedo {
             self.look_up(item, &line, &met.hit)
         } else {
             let material = self.scene.material(&self.scene.objects[item.object], met.hit.slot);
             let finish = item.geometry.finish(&met.hit, line.at(met.hit.t));
-            (material, material.base_color, material.opacity, finish.normal)
+            (material, material.base_color, material.opacity, finish)
         };
         let world = |n: DVec3| (item.world_from_normal * n).normalize_or(-ray.direction);
         let true_normal = world(met.hit.normal);
         let side = if true_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+        let mut normal = world(finish.normal);
+        if let (Some(map), true) = (&material.normal_map, wants.color || wants.normal) {
+            normal = self.turned(met, map, normal, &finish);
+        }
         let position = ray.at(met.hit.t);
         let reach = position.abs().max_element().max(met.hit.t).max(item.bounds.radius());
         Point {
             position,
             true_normal: true_normal * side,
-            normal: world(smooth) * side,
+            normal: normal * side,
             material,
             color,
             opacity,
             lift: reach * LIFT,
         }
+    }
+
+    /// Returns a normal on the outside as a normal map turns it; as it is where there are no texture coordinates.
+    fn turned(&self, met: &Met<'_>, map: &NormalMap, normal: DVec3, finish: &Finish) -> DVec3 {
+        let object = &self.scene.objects[met.item.object];
+        let (Shape::Mesh(mesh), Some(uv)) = (&*object.shape, finish.uv) else { return normal };
+        let Some(along) = mesh.along_uv(met.hit.part as usize) else { return normal };
+        let along = along.map(|v| (object.world_from_object.matrix3 * v.as_dvec3()).as_vec3());
+        self.scene.turned_normal(map, normal.as_vec3(), along, uv, 0.0).as_dvec3()
     }
 }

@@ -140,7 +140,28 @@ fn turn(body: &Body, camera: &Camera, facing: &mut [bool], threads: &dyn Threads
 }
 
 impl Piece {
+    /// Finds the lines of a piece with the instructions that there are; the bytes do not depend on them.
     fn find(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>, veil: &Veil) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.find_avx2(bodies, facing, sight, veil) };
+        }
+        self.find_here(bodies, facing, sight, veil);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn find_avx2(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>, veil: &Veil) {
+        self.find_here(bodies, facing, sight, veil);
+    }
+
+    #[inline(always)]
+    fn find_here(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>, veil: &Veil) {
         let body = &bodies[self.body];
         let style_index = sight.styles.index(body.object + 1);
         let style = &sight.styles.all[usize::from(style_index)];
@@ -213,11 +234,13 @@ impl Lens {
     }
 
     /// Returns a corner in camera space.
+    #[inline(always)]
     fn ahead(&self, corner: Vec3) -> DVec3 {
         self.view_from_object.transform_point3(corner.as_dvec3())
     }
 
     /// Returns where a place before the eye is on the picture.
+    #[inline(always)]
     fn pixel(&self, p: DVec3) -> [f64; 2] {
         let ahead = if self.is_parallel { 1.0 } else { -p.z };
         [
@@ -227,6 +250,7 @@ impl Lens {
     }
 
     /// Cuts off what is behind the eye or outside of the picture, with a margin for wide lines.
+    #[inline(always)]
     fn clip(&self, mut a: DVec3, mut b: DVec3) -> Option<[DVec3; 2]> {
         let margin = 1.0 + 32.0 / self.size[1].max(1.0);
         let reach = a.length().max(b.length());
@@ -260,6 +284,7 @@ impl Lens {
 }
 
 /// Puts the seen parts of an edge, and the hidden ones where they are dashed, into a list.
+#[inline(always)]
 fn trace(
     lens: &Lens,
     sight: &Sight<'_>,
@@ -270,7 +295,8 @@ fn trace(
 ) {
     let Some([a, b]) = lens.clip(a, b) else { return };
     let [from, to] = [a, b].map(|p| lens.pixel(p));
-    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+    let (across, down) = (to[0] - from[0], to[1] - from[1]);
+    let length = (across * across + down * down).sqrt();
     if !length.is_finite() || length > 1e5 {
         return;
     }

@@ -240,6 +240,7 @@ impl Converter {
             let mut model = voxelize::voxelize(scene, object, tolerance, detail.max_resolution, threads)
                 .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
             model.bound *= scale;
+            note_normal_maps(&mut model.why, scene, object);
             Ok(model)
         })
     }
@@ -264,6 +265,7 @@ impl Converter {
                 distance::of_mesh(scene, object, &surface.mesh, tolerance, detail.max_resolution, threads)
                     .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
             model.bound = model.bound * scale + surface.bound;
+            note_normal_maps(&mut model.why, scene, object);
             Ok(model)
         })
     }
@@ -339,6 +341,13 @@ impl Converter {
         let bytes = size.iter().map(|&s| u64::from(s)).product::<u64>() * 5;
         let [x, y, z] = size;
         Forecast::of_grid(bytes, distance::bound(step) * scale, format!("{x}x{y}x{z} signed distances"))
+    }
+}
+
+/// Says that normal maps are lost, if there are any.
+fn note_normal_maps(why: &mut String, scene: &Scene, object: &Object) {
+    if (0..object.materials.len()).any(|slot| scene.material(object, slot).normal_map.is_some()) {
+        why.push_str(", without its normal maps");
     }
 }
 

@@ -117,6 +117,7 @@ impl ColorBox {
         Material {
             base_color: sum / count.max(1) as f32,
             texture: None,
+            normal_map: None,
             alpha: crate::scene::AlphaMode::Opaque,
             ..scene.material(object, slot).clone()
         }

@@ -87,6 +87,15 @@ fn format_of(bytes: &[u8], name: &str) -> Result<ImageFormat, Fault> {
     }
 }
 
+/// What the pixels of a picture are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Holds {
+    /// Colors in sRGB.
+    Colors,
+    /// Numbers as they are.
+    Data,
+}
+
 /// Makes the textures of one scene, within one budget of pixels.
 pub(crate) struct TextureMaker<'a> {
     limits: &'a Limits,
@@ -103,20 +112,24 @@ impl<'a> TextureMaker<'a> {
         &mut self,
         name: &str,
         bytes: Result<impl AsRef<[u8]>, Fault>,
-        wrap: [TextureWrap; 2],
+        (wrap, holds): ([TextureWrap; 2], Holds),
         notes: &mut Notes,
     ) -> Texture {
-        let made = bytes.and_then(|bytes| self.decode(name, bytes.as_ref()));
+        let made = bytes.and_then(|bytes| self.decode(name, bytes.as_ref(), holds));
         let mut texture = made.unwrap_or_else(|fault| {
-            notes.add(format!("texture `{name}` is replaced by a checker: {}", fault.what()));
-            placeholder(name)
+            let (instead, with) = match holds {
+                Holds::Colors => ("a checker", placeholder(name)),
+                Holds::Data => ("normals that turn nothing", Texture::from_linear16(name, 1, 1, vec![FLAT])),
+            };
+            notes.add(format!("texture `{name}` is replaced by {instead}: {}", fault.what()));
+            with
         });
         texture.wrap = wrap;
         texture
     }
 
     /// Decodes a texture, or says why not.
-    pub(crate) fn decode(&mut self, name: &str, bytes: &[u8]) -> Result<Texture, Fault> {
+    pub(crate) fn decode(&mut self, name: &str, bytes: &[u8], holds: Holds) -> Result<Texture, Fault> {
         let [width, height] = size_of_picture(bytes, format_of(bytes, name)?)?;
         let total = self.pixels + u64::from(width) * u64::from(height);
         if total > self.limits.all_texture_pixels {
@@ -128,9 +141,16 @@ impl<'a> TextureMaker<'a> {
         }
         let picture = decode_picture(bytes, name, self.limits)?.into_rgba8();
         self.pixels = total;
-        Ok(Texture::from_srgb8(name, picture.width(), picture.height(), picture.as_raw()))
+        let (width, height, pixels) = (picture.width(), picture.height(), picture.as_raw());
+        Ok(match holds {
+            Holds::Colors => Texture::from_srgb8(name, width, height, pixels),
+            Holds::Data => Texture::from_linear8(name, width, height, pixels),
+        })
     }
 }
+
+/// The texel of a normal map that leaves normals as they are.
+const FLAT: [u16; 4] = [32768, 32768, 65535, 65535];
 
 /// Edge of the placeholder in pixels.
 const PLACEHOLDER: u32 = 64;
@@ -177,7 +197,8 @@ mod tests {
     fn what_cannot_be_decoded_becomes_a_loud_checker_with_a_note() {
         let (limits, mut notes) = (Limits::default(), Notes::default());
         let mut maker = TextureMaker::new(&limits);
-        let texture = maker.make("x.png", Ok(b"nonsense"), [TextureWrap::Repeat; 2], &mut notes);
+        let texture =
+            maker.make("x.png", Ok(b"nonsense"), ([TextureWrap::Repeat; 2], Holds::Colors), &mut notes);
         assert_eq!(texture.size(), [PLACEHOLDER; 2]);
         assert!((texture.sample([0.03, 0.03], 0.0).x - 1.0).abs() < 1e-3);
         assert!(notes.into_lines()[0].starts_with("texture `x.png` is replaced by a checker"));
@@ -187,8 +208,8 @@ mod tests {
     fn textures_share_one_budget() {
         let limits = Limits { all_texture_pixels: 150, ..Limits::default() };
         let mut maker = TextureMaker::new(&limits);
-        assert!(maker.decode("a.png", &png(10, 10)).is_ok());
-        assert!(maker.decode("b.png", &png(10, 10)).is_err());
-        assert!(maker.decode("c.png", &png(5, 10)).is_ok());
+        assert!(maker.decode("a.png", &png(10, 10), Holds::Colors).is_ok());
+        assert!(maker.decode("b.png", &png(10, 10), Holds::Colors).is_err());
+        assert!(maker.decode("c.png", &png(5, 10), Holds::Colors).is_ok());
     }
 }

@@ -37,6 +37,44 @@ pub struct Material {
     pub reflectivity: f32,
     /// What the texture's alpha means.
     pub alpha: AlphaMode,
+    /// What turns the normals of its surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normal_map: Option<NormalMap>,
+}
+
+/// A picture of normals, laid on by the texture coordinates of a shape: red to the right, green up, blue outward, each
+/// from -1 to 1 (glTF 2.0, 3.9.3). Shapes without texture coordinates keep their normals.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NormalMap {
+    /// Index into the scene's textures; of its bytes no gamma is taken off.
+    pub texture: usize,
+    /// Factor on red and green.
+    #[serde(default = "one")]
+    pub scale: f32,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+impl NormalMap {
+    /// Turns a unit normal by a texel. `along` are the changes of the place with u, to the right in the picture, and with
+    /// v, down in it; only their directions count. Both are made square to the normal, as in MikkTSpace, but belong to
+    /// the triangle, not to its corners. A normal that comes out as nothing, or of directions that are none, is the given
+    /// one.
+    #[must_use]
+    #[inline(always)]
+    pub fn turned(&self, normal: Vec3, along: [Vec3; 2], texel: Vec3) -> Vec3 {
+        let right = along[0] - normal * normal.dot(along[0]);
+        let right = right / right.length();
+        let across = normal.cross(right);
+        let up = if across.dot(along[1]) > 0.0 { -across } else { across };
+        let [x, y, z] = (texel * 2.0 - 1.0).to_array();
+        let turned = right * (x * self.scale) + up * (y * self.scale) + normal * z;
+        let unit = turned / turned.length();
+        if unit.is_finite() { unit } else { normal }
+    }
 }
 
 /// What the alpha of a texture means.
@@ -87,6 +125,7 @@ impl Material {
             opacity: 1.0,
             reflectivity: 0.0,
             alpha: AlphaMode::Opaque,
+            normal_map: None,
         }
     }
 
@@ -196,6 +235,25 @@ mod tests {
             let material = Material::new(color);
             let text = ron::to_string(&material).unwrap();
             assert_eq!(ron::from_str::<Material>(&text).unwrap(), material, "{text}");
+        }
+    }
+
+    #[test]
+    fn normals_turn_to_the_right_and_up_of_the_picture() {
+        let map = NormalMap { texture: 0, scale: 1.0 };
+        // On a floor whose picture's right is x and whose picture's down is z.
+        let along = [Vec3::X * 3.0, Vec3::Z * 0.5];
+        let turned = |texel: Vec3| map.turned(Vec3::Y, along, texel);
+        assert_eq!(turned(Vec3::new(0.5, 0.5, 1.0)), Vec3::Y);
+        assert_eq!(turned(Vec3::new(1.0, 0.5, 0.5)), Vec3::X);
+        assert_eq!(turned(Vec3::new(0.5, 1.0, 0.5)), -Vec3::Z);
+        let mirrored = map.turned(Vec3::Y, [-Vec3::X, Vec3::Z], Vec3::new(1.0, 1.0, 0.5));
+        assert!((mirrored - Vec3::new(-1.0, 0.0, -1.0).normalize_or_zero()).length() < 1e-6, "{mirrored}");
+        let half = NormalMap { scale: 0.5, ..map }.turned(Vec3::Y, along, Vec3::new(1.0, 0.5, 1.0));
+        assert!((half - Vec3::new(0.5, 1.0, 0.0).normalize_or_zero()).length() < 1e-6, "{half}");
+        for (along, texel) in [([Vec3::Y; 2], Vec3::X), ([Vec3::ZERO; 2], Vec3::X), (along, Vec3::splat(0.5))]
+        {
+            assert_eq!(map.turned(Vec3::Y, along, texel), Vec3::Y);
         }
     }
 

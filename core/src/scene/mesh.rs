@@ -49,8 +49,26 @@ impl Mesh {
 
     /// Returns the corner positions of a triangle.
     #[must_use]
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|i| self.positions[i as usize])
+    }
+
+    /// Returns how a place moves with u and with v on a triangle, in object space, up to a factor that both share;
+    /// nothing where there are no texture coordinates or all three are on a line.
+    #[must_use]
+    #[inline(always)]
+    pub fn along_uv(&self, triangle: usize) -> Option<[Vec3; 2]> {
+        if self.uvs.is_empty() {
+            return None;
+        }
+        let [a, b, c] = self.triangles[triangle].map(|i| (self.positions[i as usize], self.uvs[i as usize]));
+        let (ab, ac, right, left) = (b.0 - a.0, c.0 - a.0, b.1 - a.1, c.1 - a.1);
+        // By the sign of the determinant alone: tiny triangles would lose their digits in dividing by it.
+        let side = right.perp_dot(left);
+        let along =
+            [(ab * left.y - ac * right.y) * side.signum(), (ac * right.x - ab * left.x) * side.signum()];
+        (side != 0.0 && along.iter().all(|v| v.is_finite())).then_some(along)
     }
 
     /// Returns the bytes held.

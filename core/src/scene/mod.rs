@@ -17,7 +17,7 @@ pub use environment::{Background, Environment, Fog, Gradient, LightingModel};
 pub use form::{Form, FreeForm, Perturbation, Power, Quadric};
 pub use height_field::HeightField;
 pub use light::{Arriving, Light, LightKind};
-pub use material::{AlphaMode, Mapping, Material, color_text};
+pub use material::{AlphaMode, Mapping, Material, NormalMap, color_text};
 pub use mesh::Mesh;
 pub use primitive::Primitive;
 #[cfg(debug_assertions)]
@@ -281,6 +281,22 @@ impl Scene {
             (Mapping::Triplanar { scale }, _) => texture.triplanar(position * scale, normal, lod),
         };
         (material.base_color * texel.truncate(), material.opacity * texel.w)
+    }
+
+    /// Returns the unit normal that a normal map makes of one, at a point of a surface with texture coordinates; see
+    /// [`NormalMap::turned`].
+    #[must_use]
+    #[inline]
+    pub fn turned_normal(
+        &self,
+        map: &NormalMap,
+        normal: Vec3,
+        along: [Vec3; 2],
+        uv: [f32; 2],
+        lod: f32,
+    ) -> Vec3 {
+        let texel = self.textures.get(map.texture).map(|texture| texture.sample(uv, lod).truncate());
+        texel.map_or(normal, |texel| map.turned(normal, along, texel))
     }
 
     /// Lists every light that reaches surfaces: the lights of the scene and one point light for each emissive

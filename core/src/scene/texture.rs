@@ -77,6 +77,18 @@ impl Texture {
         Self::from_linear16(name, width, height, texels)
     }
 
+    /// Builds a texture of data from 8-bit pixels: nothing is taken for sRGB. Otherwise as [`Texture::from_srgb8`].
+    ///
+    /// # Panics
+    /// When the number of bytes does not fit the size, or the size is zero.
+    #[must_use]
+    pub fn from_linear8(name: impl Into<String>, width: u32, height: u32, rgba: &[u8]) -> Self {
+        assert_eq!(rgba.len(), 4 * width as usize * height as usize, "bytes of a {width}x{height} texture");
+        let texels =
+            rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]].map(|b| u16::from(b) * 257)).collect();
+        Self::from_linear16(name, width, height, texels)
+    }
+
     /// Builds a texture from [`Texture::texels`]: linear light and alpha, 65535 = 1, row 0 at the top.
     ///
     /// # Panics

@@ -84,10 +84,13 @@ impl Demand {
         let shading = need.channels.has(Channel::Color);
         let drawn = || scene.objects.iter().filter(|o| why_not_drawn(o).is_none());
         let materials = || drawn().flat_map(|o| (0..slots(o)).map(|slot| scene.material(o, slot)));
-        let mut used: Vec<usize> = materials().filter_map(|m| m.texture).collect();
+        let normals = shading || need.channels.has(Channel::Normal);
+        let reads_color = shading || need.channels.has(Channel::Albedo);
+        let colors = materials().filter_map(|m| m.texture.filter(|_| reads_color));
+        let of_normals = materials().filter_map(|m| m.normal_map.filter(|_| normals).map(|map| map.texture));
+        let mut used: Vec<usize> = colors.chain(of_normals).collect();
         used.sort_unstable();
         used.dedup();
-        let reads = (shading || need.channels.has(Channel::Albedo)) && !used.is_empty();
         let bytes = used.iter().filter_map(|&t| scene.textures.get(t)).map(|t| t.bytes()).sum();
         let general = match (shading || need.channels.has(Channel::Shadow), shadow_switch) {
             (false, _) => Err("neither color nor shadow is asked for"),
@@ -107,8 +110,8 @@ impl Demand {
         };
         Self {
             shading,
-            normals: shading || need.channels.has(Channel::Normal),
-            textures: reads.then_some(bytes),
+            normals,
+            textures: (!used.is_empty()).then_some(bytes),
             layers: materials().any(crate::scene::Material::is_see_through),
             shadows: lights.iter().map(shadow_of).collect(),
         }

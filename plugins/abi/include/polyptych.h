@@ -34,7 +34,9 @@
 #define POLYPTYCH_MAJOR 1
 
 // Version of the interface that only adds.
-#define POLYPTYCH_MINOR 0
+//
+// 1: materials have normal maps.
+#define POLYPTYCH_MINOR 1
 
 // Instead of an object's index: no object.
 #define POLYPTYCH_NO_OBJECT 4294967295
@@ -539,6 +541,11 @@ typedef struct PolyptychMaterial {
   uint32_t alpha;
   // Where holes begin.
   float alpha_cutoff;
+  // Since 1.1: index of a texture plus one, of which red, green and blue from 0 to 1 are normals from -1 to 1: to the
+  // right of the picture, up in it, outward; 0 = none.
+  uint32_t normal_map;
+  // Since 1.1: factor on red and green of those.
+  float normal_scale;
 } PolyptychMaterial;
 
 // A picture on surfaces.

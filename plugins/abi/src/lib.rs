@@ -21,7 +21,9 @@ pub const POLYPTYCH_MAGIC: u32 = 0x5059_4c50;
 /// Version of the interface that breaks with what was before.
 pub const POLYPTYCH_MAJOR: u32 = 1;
 /// Version of the interface that only adds.
-pub const POLYPTYCH_MINOR: u32 = 0;
+///
+/// 1: materials have normal maps.
+pub const POLYPTYCH_MINOR: u32 = 1;
 
 /// Instead of an object's index: no object.
 pub const POLYPTYCH_NO_OBJECT: u32 = 0xffff_ffff;
@@ -524,6 +526,11 @@ pub struct PolyptychMaterial {
     pub alpha: u32,
     /// Where holes begin.
     pub alpha_cutoff: f32,
+    /// Since 1.1: index of a texture plus one, of which red, green and blue from 0 to 1 are normals from -1 to 1: to the
+    /// right of the picture, up in it, outward; 0 = none.
+    pub normal_map: u32,
+    /// Since 1.1: factor on red and green of those.
+    pub normal_scale: f32,
 }
 
 /// A picture on surfaces.

@@ -281,6 +281,8 @@ fn material(place: &mut impl Place, material: &Material) -> PolyptychMaterial {
         triplanar,
         alpha,
         alpha_cutoff,
+        normal_map: material.normal_map.map_or(0, |map| map.texture as u32 + 1),
+        normal_scale: material.normal_map.map_or(0.0, |map| map.scale),
     }
 }
 

@@ -10,8 +10,8 @@ use polyptych_core::camera::{Camera, Projection, WarpTable};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{
     AlphaMode, Background, Chunk, Environment, Fog, Form, FreeForm, HeightField, Light, LightKind,
-    LightingModel, Mapping, Material, Mesh, Object, Perturbation, Power, Primitive, Quadric, Samples, Scene,
-    Shape, Texture, TextureWrap, TransferFunction, TransferPoint, Volume, Voxels,
+    LightingModel, Mapping, Material, Mesh, NormalMap, Object, Perturbation, Power, Primitive, Quadric,
+    Samples, Scene, Shape, Texture, TextureWrap, TransferFunction, TransferPoint, Volume, Voxels,
 };
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char};
@@ -338,6 +338,10 @@ unsafe fn material(flat: &abi::PolyptychMaterial) -> Material {
             abi::POLYPTYCH_ALPHA_BLEND => AlphaMode::Blend,
             _ => AlphaMode::Opaque,
         },
+        normal_map: flat
+            .normal_map
+            .checked_sub(1)
+            .map(|t| NormalMap { texture: t as usize, scale: flat.normal_scale }),
     }
 }
 

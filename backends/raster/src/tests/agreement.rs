@@ -2,13 +2,15 @@
 
 use super::{camera, cube, plane, scene_of};
 use crate::Raster;
-use glam::{DMat3, DVec2, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channels, Framebuffer};
 use polyptych_core::metrics::{Errors, Gate};
 use polyptych_core::parallel::Pool;
-use polyptych_core::scene::{HeightField, Light, Material, Primitive, Scene, Shape, Voxels};
+use polyptych_core::scene::{
+    HeightField, Light, Material, Mesh, NormalMap, Primitive, Scene, Shape, Texture, Voxels,
+};
 use polyptych_core::seam::{Control, Need, Renderer};
 use polyptych_reference::Reference;
 use std::sync::Arc;
@@ -94,4 +96,59 @@ fn show(picture: &Framebuffer, truth: &Framebuffer) {
             );
         }
     }
+}
+
+/// A square that stands, of two triangles that share corners, twice as dense in texture coordinates to the right.
+fn board() -> Shape {
+    let corner = |x: f32, y: f32| Vec3::new(x, y, 0.2 * x * y);
+    Shape::Mesh(Mesh {
+        positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+        normals: [-0.2, 0.2, 0.2, -0.2].map(|x| Vec3::new(x, 0.1, 1.0).normalize_or_zero()).to_vec(),
+        uvs: [[0.0, 1.0], [2.0, 1.0], [2.0, 0.0], [0.0, 0.0]].map(Vec2::from_array).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    })
+}
+
+#[test]
+fn normal_maps_turn_normals_as_in_the_reference() {
+    let mut random = super::Random(77);
+    let texels: Vec<u8> =
+        (0..16 * 4).map(|i| 255 - (random.next() * if i % 4 < 2 { 255.0 } else { 90.0 }) as u8).collect();
+    // One as it is, one mirrored, one turned away.
+    let mut scene = scene_of([-2.2, 0.0, 2.2].map(|x| (board(), [x, 0.0, 0.0])).to_vec());
+    let texture = scene.add_texture(Texture::from_linear8("bumps", 4, 4, &texels));
+    scene.materials[0].normal_map = Some(NormalMap { texture, scale: 0.8 });
+    scene.objects[1].world_from_object.matrix3 = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+    scene.objects[2].world_from_object.matrix3 = DMat3::from_rotation_y(2.8);
+    scene.lights = vec![Light { intensity: 0.9, ..Light::directional(DVec3::new(-0.5, -1.0, -0.45)) }];
+    let (scene, pool) = (Arc::new(scene), Pool::new(2).unwrap());
+    let control = Control::new(&pool);
+    let need = Need { channels: Channels::ALL, ..Need::new(camera([0.3, 0.4, 5.0], [0.0; 3]), 480, 200) };
+    let draw = |renderer: &mut dyn Renderer, need: &Need| {
+        renderer.prepare(&scene, need, &Converter::default(), &control).unwrap();
+        let mut picture = Framebuffer::new(need.width, need.height, need.channels);
+        renderer.render(&need.frame(), &mut picture, &control).unwrap();
+        picture
+    };
+    let (picture, truth) = (draw(&mut Raster::new(), &need), draw(&mut Reference::new(), &need));
+    let mut flat = need.clone();
+    let declared = Raster::new().info().parameters.clone();
+    flat.settings.set("raster", &declared, "shading", "flat").unwrap();
+    let flat = draw(&mut Raster::new(), &flat);
+    let (mut seen, mut turned, mut others) = ([0; 3], 0, 0);
+    for i in 0..truth.id().len() {
+        if truth.id()[i] == 0 || picture.id()[i] != truth.id()[i] {
+            continue;
+        }
+        seen[truth.id()[i] as usize - 1] += 1;
+        let (normal, color) = (truth.normal()[i], truth.color()[i]);
+        turned += usize::from(normal.dot(flat.normal()[i]) < 0.9);
+        let same =
+            (picture.normal()[i] - normal).length() < 1e-4 && (picture.color()[i] - color).length() < 1e-3;
+        others += usize::from(!same);
+    }
+    // Where a pixel's center is on a diagonal the other triangle may be seen.
+    assert!(others <= 2, "{others} pixels differ");
+    assert!(seen.iter().all(|&seen| seen > 5000) && turned > 5000, "{seen:?} {turned}");
 }

@@ -5,7 +5,9 @@ use glam::{DVec3, Vec2, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::framebuffer::Framebuffer;
 use polyptych_core::math::Aabb;
-use polyptych_core::scene::{AlphaMode, Background, Material, Mesh, Object, Scene, Shape, Texture};
+use polyptych_core::scene::{
+    AlphaMode, Background, Material, Mesh, Object, Scene, Shape, Texture, TextureWrap,
+};
 
 /// Visits the ray and the index of every pixel.
 fn for_each_ray(
@@ -141,6 +143,39 @@ fn grazing_textures_fade_to_their_mean() {
     let picture = draw(&scene, camera([0.0, 0.3, 9.0], [0.0, 0.3, 0.0]), 100, 100);
     let far: Vec<f32> = (52 * 100 + 45..52 * 100 + 55).map(|i| picture.albedo()[i].x).collect();
     assert!(far.iter().all(|v| (v - 0.5).abs() < 0.01), "{far:?}");
+}
+
+#[test]
+fn grazing_stripes_that_run_away_stay_sharp() {
+    // Half a meter wide, which is four pixels there, of which each is five meters long.
+    let stripes: Vec<u8> = (0..8).flat_map(|i: u8| [[255; 4], [0, 0, 0, 255]][usize::from(i % 2)]).collect();
+    let scene = textured_floor(Texture::from_srgb8("stripes", 2, 4, &stripes));
+    let picture = draw(&scene, camera([0.0, 0.3, 9.0], [0.0, 0.3, 0.0]), 100, 100);
+    let row: Vec<f32> = (52 * 100 + 40..52 * 100 + 60).map(|i| picture.albedo()[i].x).collect();
+    let [least, most] = [row.iter().copied().fold(1.0, f32::min), row.iter().copied().fold(0.0, f32::max)];
+    // Between the middles of two texels their colors are mixed.
+    assert!(least < 0.15 && most > 0.85, "{row:?}");
+}
+
+#[test]
+fn beyond_a_border_that_is_drawn_out_nothing_but_the_border_is_seen() {
+    let at_border = |i: usize| [0, 7].contains(&(i % 8)) || [0, 7].contains(&(i / 8));
+    let framed: Vec<u8> =
+        (0..64).flat_map(|i| [[0, 0, 0, 255], [255; 4]][usize::from(at_border(i))]).collect();
+    let mut texture = Texture::from_srgb8("frame", 8, 8, &framed);
+    texture.wrap = [TextureWrap::Clamp; 2];
+    let scene = textured_floor(texture);
+    let camera = camera([4.0, 0.3, 9.0], [4.0, 0.3, 0.0]);
+    let picture = draw(&scene, camera.clone(), 100, 100);
+    let mut checked = 0;
+    for_each_ray(&camera, &picture, |i, ray| {
+        let hit = ray.at(-ray.origin.y / ray.direction.y);
+        if picture.id()[i] == 1 && !(-0.5..1.5).contains(&hit.x) {
+            checked += 1;
+            assert!(picture.albedo()[i].x > 0.999, "{hit}: {}", picture.albedo()[i]);
+        }
+    });
+    assert!(checked > 2000, "{checked}");
 }
 
 #[test]

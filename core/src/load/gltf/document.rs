@@ -247,6 +247,8 @@ pub(super) struct TextureInfo {
     pub(super) index: usize,
     #[serde(default)]
     pub(super) tex_coord: u32,
+    /// Of normal textures alone.
+    pub(super) scale: Option<f32>,
     #[serde(default)]
     pub(super) extensions: TextureInfoExtensions,
 }
@@ -258,7 +260,7 @@ pub(super) struct TextureInfoExtensions {
     pub(super) transform: Option<TextureTransform>,
 }
 
-#[derive(Deserialize, Clone, Copy)]
+#[derive(Deserialize, Clone, Copy, PartialEq)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct TextureTransform {
     pub(super) offset: [f32; 2],

@@ -8,16 +8,18 @@
 //! | metal `m`, `r` below 0.4 | reflectivity `0.6 m (1 - r / 0.4)` |
 //! | emissive factor x strength | emission; with an emissive texture none, since a factor alone would light everything |
 //! | alpha mode, cutoff | alpha, opacity |
+//! | normal texture, scale | normal map |
 //! | unlit | diffuse only |
 //!
-//! Normal, occlusion, metal and emissive textures are left out, with a note.
+//! Normal textures turn the shading normals; the tangents of a file are not read, those of triangles serve. Occlusion,
+//! metal and emissive textures are left out, with a note, as are normal textures with coordinates of their own.
 
 use super::data::{Data, read_uri};
 use super::document::{Document, MaterialEntry, TextureInfo, TextureTransform};
 use crate::load::error::{Fault, one_line};
-use crate::load::image::TextureMaker;
+use crate::load::image::{Holds, TextureMaker};
 use crate::load::source::Source;
-use crate::scene::{AlphaMode, Material, Scene, TextureWrap};
+use crate::scene::{AlphaMode, Material, NormalMap, Scene, TextureWrap};
 use glam::{Vec2, Vec3};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -28,13 +30,13 @@ pub(super) struct Materials<'a> {
     data: &'a Data<'a>,
     maker: TextureMaker<'a>,
     placed: HashMap<Option<usize>, usize>,
-    textures: HashMap<(usize, [TextureWrap; 2]), usize>,
+    textures: HashMap<(usize, [TextureWrap; 2], Holds), usize>,
     /// Receives materials and textures.
     pub(super) scene: Scene,
 }
 
 /// Which texture coordinates a material reads, and what it does to them.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct UvSource {
     /// Whether the material has a texture at all.
     pub(super) wanted: bool,
@@ -43,6 +45,11 @@ pub(super) struct UvSource {
 }
 
 impl UvSource {
+    fn of(info: &TextureInfo) -> Self {
+        let transform = info.extensions.transform;
+        Self { wanted: true, set: transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord), transform }
+    }
+
     /// Applies `KHR_texture_transform`: scale, then rotate, then move.
     pub(super) fn transform(&self, uv: Vec2) -> Vec2 {
         let Some(t) = self.transform else { return uv };
@@ -67,12 +74,11 @@ impl<'a> Materials<'a> {
 
     /// Tells which texture coordinates a material reads.
     pub(super) fn uv_source(&self, material: Option<usize>) -> UvSource {
-        let info = material
-            .and_then(|m| self.document.materials[m].pbr_metallic_roughness.base_color_texture.as_ref());
-        let Some(info) = info else { return UvSource { wanted: false, set: 0, transform: None } };
-        let transform = info.extensions.transform;
-        let set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
-        UvSource { wanted: true, set, transform }
+        let entry = material.map(|m| &self.document.materials[m]);
+        let info = entry.and_then(|entry| {
+            entry.pbr_metallic_roughness.base_color_texture.as_ref().or(entry.normal_texture.as_ref())
+        });
+        info.map_or(UvSource { wanted: false, set: 0, transform: None }, UvSource::of)
     }
 
     /// Returns the scene's index of a material.
@@ -86,9 +92,15 @@ impl<'a> Materials<'a> {
                 let entry = &self.document.materials[index];
                 let mut made = convert(entry, index);
                 if let Some(info) = &entry.pbr_metallic_roughness.base_color_texture {
-                    made.texture = self.texture(info, source);
+                    made.texture = Some(self.texture(info, Holds::Colors, source));
                 }
-                note_what_is_left_out(entry, source);
+                let fits = |info: &&TextureInfo| UvSource::of(info) == self.uv_source(material);
+                if let Some(info) = entry.normal_texture.as_ref().filter(fits) {
+                    let texture = self.texture(info, Holds::Data, source);
+                    let scale = finite(info.scale.unwrap_or(1.0), 1.0).clamp(-100.0, 100.0);
+                    made.normal_map = Some(NormalMap { texture, scale });
+                }
+                note_what_is_left_out(entry, made.normal_map.is_some(), source);
                 made
             }
         };
@@ -97,7 +109,7 @@ impl<'a> Materials<'a> {
         index
     }
 
-    fn texture(&mut self, info: &TextureInfo, source: &mut Source<'_>) -> Option<usize> {
+    fn texture(&mut self, info: &TextureInfo, holds: Holds, source: &mut Source<'_>) -> usize {
         let texture = &self.document.textures[info.index];
         let wrap = texture.sampler.map_or([TextureWrap::Repeat; 2], |s| {
             let sampler = &self.document.samplers[s];
@@ -109,15 +121,15 @@ impl<'a> Materials<'a> {
         });
         // A texture without source has it in an extension (KTX2, WebP): the placeholder stands for it.
         let image = texture.source.unwrap_or(usize::MAX);
-        if let Some(&known) = self.textures.get(&(image, wrap)) {
-            return Some(known);
+        if let Some(&known) = self.textures.get(&(image, wrap, holds)) {
+            return known;
         }
         let name = self.image_name(image);
         let bytes = self.image_bytes(image, source);
-        let made = self.maker.make(&name, bytes, wrap, &mut source.notes);
+        let made = self.maker.make(&name, bytes, (wrap, holds), &mut source.notes);
         let index = self.scene.add_texture(made);
-        self.textures.insert((image, wrap), index);
-        Some(index)
+        self.textures.insert((image, wrap, holds), index);
+        index
     }
 
     fn image_name(&self, image: usize) -> String {
@@ -174,9 +186,12 @@ fn convert(entry: &MaterialEntry, index: usize) -> Material {
     material
 }
 
-fn note_what_is_left_out(entry: &MaterialEntry, source: &mut Source<'_>) {
+fn note_what_is_left_out(entry: &MaterialEntry, has_normal_map: bool, source: &mut Source<'_>) {
     for (name, present) in [
-        ("normal maps", entry.normal_texture.is_some()),
+        (
+            "normal maps with texture coordinates of their own",
+            entry.normal_texture.is_some() && !has_normal_map,
+        ),
         ("occlusion maps", entry.occlusion_texture.is_some()),
         ("metal and roughness maps", entry.pbr_metallic_roughness.metallic_roughness_texture.is_some()),
         ("emissive maps", entry.emissive_texture.is_some()),

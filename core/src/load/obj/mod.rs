@@ -6,9 +6,9 @@ mod read;
 mod statements;
 
 use super::error::{Fault, one_line};
-use super::image::TextureMaker;
+use super::image::{Holds, TextureMaker};
 use super::source::Source;
-use crate::scene::{Material, Object, Scene, Shape};
+use crate::scene::{Material, NormalMap, Object, Scene, Shape};
 use mtl::{LibraryMaterial, TextureReference};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -62,7 +62,7 @@ fn library_files(argument: &str, source: &Source<'_>) -> Vec<String> {
 struct MaterialTable {
     entries: HashMap<String, LibraryMaterial>,
     placed: HashMap<Option<String>, usize>,
-    textures: HashMap<TextureReference, usize>,
+    textures: HashMap<(TextureReference, Holds), usize>,
 }
 
 impl MaterialTable {
@@ -95,8 +95,14 @@ impl MaterialTable {
         let material = match name.and_then(|n| self.entries.get(n)) {
             Some(entry) => {
                 let mut material = entry.material.clone();
-                if let Some(reference) = entry.texture.clone() {
-                    material.texture = Some(self.texture(reference, scene, textures, source));
+                let (color, normals) = (entry.texture.clone(), entry.normals.clone());
+                if let Some(reference) = color {
+                    material.texture =
+                        Some(self.texture((reference, Holds::Colors), scene, textures, source));
+                }
+                if let Some(reference) = normals {
+                    let texture = self.texture((reference, Holds::Data), scene, textures, source);
+                    material.normal_map = Some(NormalMap { texture, scale: 1.0 });
                 }
                 material
             }
@@ -114,19 +120,20 @@ impl MaterialTable {
 
     fn texture(
         &mut self,
-        reference: TextureReference,
+        asked: (TextureReference, Holds),
         scene: &mut Scene,
         textures: &mut TextureMaker<'_>,
         source: &mut Source<'_>,
     ) -> usize {
-        if let Some(&known) = self.textures.get(&reference) {
+        if let Some(&known) = self.textures.get(&asked) {
             return known;
         }
+        let (reference, holds) = &asked;
         let bytes = source.folder.read(&reference.file);
         let name = one_line(&reference.file);
-        let texture = textures.make(&name, bytes, reference.wrap, &mut source.notes);
+        let texture = textures.make(&name, bytes, (reference.wrap, *holds), &mut source.notes);
         let index = scene.add_texture(texture);
-        self.textures.insert(reference, index);
+        self.textures.insert(asked, index);
         index
     }
 }

@@ -17,6 +17,8 @@ pub(super) struct LibraryMaterial {
     pub(super) name: String,
     pub(super) material: Material,
     pub(super) texture: Option<TextureReference>,
+    /// A picture of normals, as the extension for physically based materials has it.
+    pub(super) normals: Option<TextureReference>,
 }
 
 /// A reference to a picture.
@@ -37,7 +39,7 @@ pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<LibraryMateria
         let keyword = decode_text(keyword).to_ascii_lowercase();
         if keyword == "newmtl" {
             let name = decode_text(words.rest()).into_owned();
-            list.push(LibraryMaterial { name, material: blank(), texture: None });
+            list.push(LibraryMaterial { name, material: blank(), texture: None, normals: None });
             opacity_map = None;
             continue;
         }
@@ -50,8 +52,9 @@ pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<LibraryMateria
             "d" => current.material.opacity = share(&mut words, 1.0),
             "tr" => current.material.opacity = 1.0 - share(&mut words, 0.0),
             "map_kd" => current.texture = texture(words.rest()),
+            "norm" => current.normals = texture(words.rest()),
             "map_d" => opacity_map = texture(words.rest()),
-            map if map.starts_with("map_") || matches!(map, "bump" | "disp" | "decal" | "norm" | "refl") => {
+            map if map.starts_with("map_") || matches!(map, "bump" | "disp" | "decal" | "refl") => {
                 unused.insert(map.to_owned());
             }
             _ => {}
@@ -152,7 +155,7 @@ mod tests {
     #[test]
     fn statements_become_materials() {
         let text = b"Kd 9 9 9\nnewmtl red paint\nKd 0.8 0.1 0\nKs 0.2 0.4 0.6\nNs 2000\nTr 0.25\nKe 3 0 0\nillum 2\n\
-            newmtl wood\nKd 0 0 0\nmap_Kd -s 2 2 -clamp on .\\my wood.png\nmap_Bump b.png\n";
+            newmtl wood\nKd 0 0 0\nmap_Kd -s 2 2 -clamp on .\\my wood.png\nmap_Bump b.png\nnorm turned.png\n";
         let mut notes = Notes::default();
         let list = read(text, &mut notes).unwrap();
         let red = &list[0].material;
@@ -164,6 +167,7 @@ mod tests {
         assert_eq!((red.shininess, red.opacity, red.emission.x), (1024.0, 0.75, 3.0));
         let texture = list[1].texture.clone().unwrap();
         assert_eq!((texture.file.as_str(), texture.wrap[0]), (".\\my wood.png", TextureWrap::Clamp));
+        assert_eq!(list[1].normals.as_ref().unwrap().file, "turned.png");
         assert_eq!(list[1].material.base_color, Vec3::ONE);
         assert!(notes.into_lines()[0].contains("map_bump"));
     }

@@ -1,15 +1,15 @@
 //! Builds a scene of a scene file.
 
 use super::place::{camera, light, transform, usage};
-use super::schema::{MaterialEntry, ObjectEntry, SceneFile, TextureEntry};
+use super::schema::{MaterialEntry, NormalMapEntry, ObjectEntry, SceneFile, TextureEntry};
 use super::schema_shapes::ShapeEntry;
 use super::shape;
 use crate::load::error::{Fault, one_line};
-use crate::load::image::{TextureMaker, checker};
+use crate::load::image::{Holds, TextureMaker, checker};
 use crate::load::limits::{LoadOptions, RawVolume};
 use crate::load::source::Source;
 use crate::load::text::decode_text;
-use crate::scene::{Object, Scene, Texture};
+use crate::scene::{NormalMap, Object, Scene, Texture};
 use crate::shade::srgb_from_linear;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -96,6 +96,17 @@ pub(super) fn with_included_options<T>(
     made
 }
 
+/// Tells what the materials of a file take a texture for.
+fn holds(file: &SceneFile, name: &str) -> Result<Holds, Fault> {
+    let is = |wanted: &String| one_line(wanted) == name;
+    let is_color = file.materials.values().any(|m| m.texture.as_ref().is_some_and(is));
+    match file.materials.values().any(|m| m.normal_map.as_ref().is_some_and(|map| is(&map.texture))) {
+        true if is_color => Err(usage(format!("texture `{name}` {}", super::BOTH), "name its file twice")),
+        true => Ok(Holds::Data),
+        false => Ok(Holds::Colors),
+    }
+}
+
 /// A model that was included: its objects, with materials as indices into the scene.
 type Included = Arc<Vec<Object>>;
 
@@ -115,16 +126,17 @@ impl Builder {
         let mut places = BTreeMap::new();
         for (name, entry) in &file.textures {
             let name = one_line(name);
+            let holds = holds(file, &name)?;
             let texture = match entry {
                 TextureEntry::File { path, wrap } => {
                     let bytes = source.folder.read(path);
-                    maker.make(&name, bytes, *wrap, &mut source.notes)
+                    maker.make(&name, bytes, (*wrap, holds), &mut source.notes)
                 }
                 TextureEntry::Png { base64, wrap } => {
                     let bytes = STANDARD
                         .decode(base64)
                         .map_err(|error| usage(format!("no base64 ({error})"), "write it with this program"));
-                    maker.make(&name, bytes, *wrap, &mut source.notes)
+                    maker.make(&name, bytes, (*wrap, holds), &mut source.notes)
                 }
                 TextureEntry::Checker { colors, cells } => {
                     if !(1..=CHECKER_PIXELS).contains(cells) {
@@ -143,13 +155,17 @@ impl Builder {
         for (name, entry) in &file.materials {
             let place = format!("material `{}`", one_line(name));
             check_material(entry).map_err(|what| usage(what, "mend the material").at(&place))?;
-            let texture = match &entry.texture {
-                Some(wanted) => Some(*textures.get(&one_line(wanted)).ok_or_else(|| {
+            let known = |wanted: &String| {
+                textures.get(&one_line(wanted)).copied().ok_or_else(|| {
                     usage(format!("{place}: there is no texture `{wanted}`"), known_names(textures))
-                })?),
-                None => None,
+                })
             };
-            let index = self.scene.add_material(entry.material(&one_line(name), texture));
+            let texture = entry.texture.as_ref().map(known).transpose()?;
+            let normal_map = |map: &NormalMapEntry| {
+                Ok::<_, Fault>(NormalMap { texture: known(&map.texture)?, scale: map.scale })
+            };
+            let normal_map = entry.normal_map.as_ref().map(normal_map).transpose()?;
+            let index = self.scene.add_material(entry.material(&one_line(name), texture, normal_map));
             self.materials.insert(one_line(name), index);
         }
         Ok(())
@@ -243,6 +259,7 @@ impl Builder {
         let (first_material, first_texture) = (self.scene.materials.len(), self.scene.textures.len());
         for mut material in model.materials.drain(..) {
             material.texture = material.texture.map(|t| t + first_texture);
+            material.normal_map.iter_mut().for_each(|map| map.texture += first_texture);
             self.scene.materials.push(material);
         }
         self.scene.textures.append(&mut model.textures);
@@ -290,6 +307,9 @@ fn check_material(entry: &MaterialEntry) -> Result<(), String> {
     }
     if entry.base_color.min_element() < 0.0 || entry.emission.min_element() < 0.0 {
         return Err("a color is negative".to_owned());
+    }
+    if let Some(map) = entry.normal_map.as_ref().filter(|map| !(-100.0..=100.0).contains(&map.scale)) {
+        return Err(format!("`normal_map.scale` must be -100 to 100, got {}", map.scale));
     }
     Ok(())
 }

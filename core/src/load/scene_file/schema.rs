@@ -6,7 +6,7 @@
 use super::schema_shapes::ShapeEntry;
 use super::schema_views::{CameraEntry, LightEntry, TransformEntry};
 use crate::scene::color_text;
-use crate::scene::{AlphaMode, Environment, Mapping, Material, TextureWrap};
+use crate::scene::{AlphaMode, Environment, Mapping, Material, NormalMap, TextureWrap};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -111,18 +111,32 @@ pub struct MaterialEntry {
     /// What the texture's alpha means.
     #[serde(skip_serializing_if = "is_default")]
     pub alpha: AlphaMode,
+    /// What turns the normals of its surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normal_map: Option<NormalMapEntry>,
+}
+
+/// A picture of normals: red to the right, green up, blue outward, each from -1 to 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NormalMapEntry {
+    /// Name of the texture; no gamma is taken off its bytes.
+    pub texture: String,
+    /// Factor on red and green.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f32,
 }
 
 impl Default for MaterialEntry {
     fn default() -> Self {
-        Self::of(&Material::default(), None)
+        Self::of(&Material::default(), None, None)
     }
 }
 
 impl MaterialEntry {
-    /// Describes a material whose texture has a name.
+    /// Describes a material whose texture and normal map have names.
     #[must_use]
-    pub fn of(material: &Material, texture: Option<String>) -> Self {
+    pub fn of(material: &Material, texture: Option<String>, normal_map: Option<NormalMapEntry>) -> Self {
         Self {
             base_color: material.base_color,
             texture,
@@ -135,12 +149,13 @@ impl MaterialEntry {
             opacity: material.opacity,
             reflectivity: material.reflectivity,
             alpha: material.alpha,
+            normal_map,
         }
     }
 
     /// Builds the material.
     #[must_use]
-    pub fn material(&self, name: &str, texture: Option<usize>) -> Material {
+    pub fn material(&self, name: &str, texture: Option<usize>, normal_map: Option<NormalMap>) -> Material {
         Material {
             name: name.to_owned(),
             base_color: self.base_color,
@@ -154,6 +169,7 @@ impl MaterialEntry {
             opacity: self.opacity,
             reflectivity: self.reflectivity,
             alpha: self.alpha,
+            normal_map,
         }
     }
 }
@@ -189,6 +205,14 @@ pub(super) fn yes() -> bool {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
 pub(super) fn is_true(value: &bool) -> bool {
     *value
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn is_one(value: &f32) -> bool {
+    *value == 1.0
 }
 
 pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {

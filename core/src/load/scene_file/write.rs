@@ -1,9 +1,10 @@
 //! Writes a scene as a scene file.
 
 use super::place::{camera_entry, light_entry, transform_entry};
-use super::schema::{MaterialEntry, MaterialNames, ObjectEntry, SceneFile, TextureEntry};
+use super::schema::{MaterialEntry, MaterialNames, NormalMapEntry, ObjectEntry, SceneFile, TextureEntry};
 use super::shape;
 use crate::load::error::one_line;
+use crate::load::image::Holds;
 use crate::scene::{Scene, Texture};
 use crate::shade::srgb_from_linear;
 use base64::Engine;
@@ -87,13 +88,18 @@ impl SceneFile {
             cameras: scene.cameras.iter().filter_map(|(name, camera)| camera_entry(name, camera)).collect(),
             ..Self::default()
         };
-        for (name, texture) in textures.iter().zip(&scene.textures) {
-            let entry = TextureEntry::Png { base64: png(texture)?, wrap: texture.wrap };
+        for (index, (name, texture)) in textures.iter().zip(&scene.textures).enumerate() {
+            let holds = holds(scene, index).map_err(|why| format!("texture `{name}` {why}"))?;
+            let entry = TextureEntry::Png { base64: png(texture, holds)?, wrap: texture.wrap };
             file.textures.insert(name.clone(), entry);
         }
         for (name, material) in materials.iter().zip(&scene.materials) {
             let texture = material.texture.and_then(|t| textures.get(t)).cloned();
-            file.materials.insert(name.clone(), MaterialEntry::of(material, texture));
+            let normal_map = material.normal_map.and_then(|map| {
+                let texture = textures.get(map.texture)?.clone();
+                Some(NormalMapEntry { texture, scale: map.scale })
+            });
+            file.materials.insert(name.clone(), MaterialEntry::of(material, texture, normal_map));
         }
         for object in &scene.objects {
             let shape =
@@ -136,19 +142,25 @@ fn unique_names<'a>(names: impl Iterator<Item = &'a str>, kind: &str) -> Vec<Str
         .collect()
 }
 
+/// Tells what the materials of a scene take a texture for.
+fn holds(scene: &Scene, texture: usize) -> Result<Holds, &'static str> {
+    let is_color = scene.materials.iter().any(|m| m.texture == Some(texture));
+    match scene.materials.iter().any(|m| m.normal_map.is_some_and(|map| map.texture == texture)) {
+        true if is_color => Err(super::BOTH),
+        true => Ok(Holds::Data),
+        false => Ok(Holds::Colors),
+    }
+}
+
 /// Encodes the full picture of a texture; 8-bit pictures come out as they went in.
-fn png(texture: &Texture) -> Result<String, String> {
+fn png(texture: &Texture, holds: Holds) -> Result<String, String> {
     let [width, height] = texture.size();
     let picture = RgbaImage::from_fn(width, height, |x, y| {
         let uv = [(x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32];
         let [r, g, b, a] = texture.sample(uv, 0.0).to_array();
         let byte = |share: f32| (share * 255.0).round() as u8;
-        image::Rgba([
-            byte(srgb_from_linear(r)),
-            byte(srgb_from_linear(g)),
-            byte(srgb_from_linear(b)),
-            byte(a),
-        ])
+        let color = |linear: f32| byte(if holds == Holds::Data { linear } else { srgb_from_linear(linear) });
+        image::Rgba([color(r), color(g), color(b), byte(a)])
     });
     let mut bytes = Vec::new();
     picture.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).map_err(|error| error.to_string())?;
