@@ -10,6 +10,7 @@ use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::load::{LoadOptions, load};
 use polyptych_core::metrics::display_colors;
 use polyptych_core::parallel::Pool;
+use polyptych_core::scene::Light;
 use polyptych_core::seam::{Control, Need, Renderer};
 use polyptych_voxel::Voxel;
 use std::error::Error;
@@ -35,9 +36,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         _ => return Err("MODEL CELLS OUT.png [EYE TARGET UP]".into()),
     };
-    let scene = Arc::new(load(Path::new(model), &LoadOptions::default())?);
+    let mut scene = load(Path::new(model), &LoadOptions::default())?;
     let bounds = scene.bounds();
     println!("{model} fills {:.2} to {:.2}", bounds.min, bounds.max);
+    if let Some((eye, target, up)) = view {
+        // From above, a little from the side of the eye.
+        let forward = (target - eye).normalize_or(DVec3::NEG_Z);
+        let right = forward.cross(up).normalize_or(DVec3::X);
+        scene.lights =
+            vec![Light::directional(forward * 0.35 + right * 0.25 - up.normalize_or(DVec3::Y) * 0.8)];
+    }
+    let scene = Arc::new(scene);
     let lens = Projection::Perspective { fov_y: 0.9 };
     let camera = view.map_or_else(
         || scene.cameras[0].1.clone(),
