@@ -15,7 +15,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub use polyptych_core::{camera, convert, framebuffer, load, math, metrics, parallel, scene, seam, shade};
+pub use polyptych_core::{
+    camera, convert, framebuffer, load, math, metrics, parallel, scene, seam, shade, stream,
+};
 
 pub mod animate;
 pub mod auto;

@@ -85,6 +85,44 @@ fn the_voxel_walk_has_no_error_of_its_own() {
     }
 }
 
+/// Off a band of one pixel along edges of cells, every pixel of every model shows the same face at the same distance.
+#[test]
+fn every_voxel_model_is_seen_as_the_reference_sees_it() {
+    let Some(folder) = models() else { return };
+    let mut files: Vec<_> =
+        std::fs::read_dir(folder.join("vox")).unwrap().map(|f| f.unwrap().path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "vox"));
+    files.sort();
+    assert!(files.len() > 30, "{} models", files.len());
+    let (mut studio, [width, height]) = (studio(2), [240usize, 135]);
+    let mut seen = 0;
+    for file in files {
+        let scene = model(&file);
+        let need = need(&scene, width as u32, height as u32);
+        let reference = studio.draw("reference", &scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
+        let picture = studio.draw("voxel", &scene, &need).unwrap_or_else(|e| panic!("{e}")).framebuffer;
+        let face = |i: usize| (reference.id()[i], reference.normal()[i].to_array().map(f32::to_bits));
+        let mut different = Vec::new();
+        for y in 1..height - 1 {
+            for x in 1..width - 1 {
+                let i = y * width + x;
+                let is_edge = (0..9).any(|k| face(i + k / 3 * width + k % 3 - width - 1) != face(i));
+                let (a, b) = (picture.distance()[i], reference.distance()[i]);
+                let same = (a == b || (a - b).abs() <= 1e-6 * b)
+                    && picture.id()[i] == reference.id()[i]
+                    && (picture.normal()[i] - reference.normal()[i]).length() < 1e-6
+                    && picture.albedo()[i] == reference.albedo()[i];
+                if !same && !is_edge {
+                    different.push((x, y));
+                }
+                seen += u32::from(reference.id()[i] != 0);
+            }
+        }
+        assert!(different.is_empty(), "{}: {different:?}", file.display());
+    }
+    assert!(seen > 100_000, "{seen} pixels show something");
+}
+
 #[test]
 fn a_camera_given_as_a_table_of_directions_is_drawn_by_every_back_end() {
     // A curved screen: a turn of 2 radians from left to right, bent upward in the middle.

@@ -102,3 +102,88 @@ fn volumes_of_the_truth_set_have_their_surface_at_the_level() {
         assert!(error <= area * mesh.bound * 0.25, "{file}: off by {error}, bound {}", mesh.bound);
     }
 }
+
+/// Counts the empty cells that water from outside does not reach, through faces or through faces, edges and corners.
+fn dry(voxels: &Voxels, corners: bool) -> u64 {
+    let size = voxels.size().map(i64::from);
+    // A layer of air around the grid.
+    let edge = size.map(|s| s + 2);
+    let index = |c: [i64; 3]| ((c[2] * edge[1] + c[1]) * edge[0] + c[0]) as usize;
+    let mut seen = vec![false; (edge[0] * edge[1] * edge[2]) as usize];
+    voxels.for_each_filled(|cell, _| seen[index(cell.map(|c| i64::from(c) + 1))] = true);
+    let steps: Vec<[i64; 3]> = (0..27)
+        .map(|k: i64| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1])
+        .filter(|s| corners || s.iter().map(|c: &i64| c.abs()).sum::<i64>() == 1)
+        .collect();
+    let mut open = vec![[0; 3]];
+    seen[0] = true;
+    while let Some(cell) = open.pop() {
+        for step in &steps {
+            let next: [i64; 3] = std::array::from_fn(|a| cell[a] + step[a]);
+            if (0..3).all(|a| (0..edge[a]).contains(&next[a]))
+                && !std::mem::replace(&mut seen[index(next)], true)
+            {
+                open.push(next);
+            }
+        }
+    }
+    seen.iter().filter(|seen| !**seen).count() as u64
+}
+
+#[test]
+fn shells_of_closed_meshes_stop_every_flood_and_enclose_their_volume() {
+    let Some(folder) = models() else { return };
+    let mut closed = 0;
+    for file in [
+        "truth/sphere_8x16.obj",
+        "truth/sphere_32x64.obj",
+        "truth/torus_24.obj",
+        "truth/torus_96.obj",
+        "stanford-bunny.obj",
+        "armadillo.obj",
+        "suzanne.obj",
+    ] {
+        let scene = model(&folder.join("mesh").join(file));
+        let object = &scene.objects[0];
+        let Shape::Mesh(mesh) = &*object.shape else { panic!("{file} is a mesh") };
+        // Vertices that only texture coordinates and rounding keep apart are one.
+        let fine = 1e5 / object.shape.bounds().radius() as f32;
+        let place = |i: u32| mesh.positions[i as usize].to_array().map(|c| (c * fine).round() as i64);
+        let mut edges = std::collections::HashMap::new();
+        for t in &mesh.triangles {
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                if place(a) != place(b) {
+                    *edges.entry((place(a).min(place(b)), place(a).max(place(b)))).or_insert(0) += 1;
+                }
+            }
+        }
+        let is_closed = edges.values().all(|&n| n == 2);
+        closed += u32::from(is_closed);
+        let area: f64 = (0..mesh.triangles.len())
+            .map(|t| {
+                let [a, b, c] = mesh.corners(t).map(Vec3::as_dvec3);
+                (b - a).cross(c - a).length() * 0.5
+            })
+            .sum();
+        for resolution in [64, 128] {
+            let detail = Detail { tolerance: 0.0, max_resolution: resolution };
+            let model = Converter::default().voxels(&scene, object, detail, &OneThread).unwrap();
+            let (through_faces, through_corners) = (dry(&model.voxels, false), dry(&model.voxels, true));
+            let cell = model.object_from_voxels.matrix3.determinant();
+            let bound = model.bound / object.world_from_object.matrix3.determinant().cbrt();
+            let (full, shell) = (through_faces as f64 * cell, model.voxels.filled() as f64 * cell);
+            if is_closed {
+                assert_eq!(
+                    through_faces, through_corners,
+                    "{file} at {resolution}: water comes in at corners"
+                );
+                let volume = mesh.volume().abs();
+                assert!(full <= volume && volume <= full + shell, "{file} at {resolution}: {full}, {volume}");
+                assert!(shell <= 2.0 * area * bound, "{file} at {resolution}: a shell of {shell}");
+            } else {
+                assert!(shell > 0.0, "{file} at {resolution}: an open mesh is its surface");
+            }
+        }
+    }
+    assert!(closed >= 4, "{closed} of the meshes are closed");
+}

@@ -5,7 +5,7 @@
 //! (`#[target_feature(enable = "avx2")]`), and chosen at run time. Fixed arrays alone would not do: the compiler
 //! unrolls a long loop body over eight numbers before it looks for vectors in it.
 
-use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 
 /// Makes eight of something, lane by lane. A plain loop: closures may stay calls in builds that do not optimize
 /// across them.
@@ -97,7 +97,7 @@ macro_rules! numbers {
 }
 numbers!(F32x8, f32: Add add +, Sub sub -, Mul mul *, Div div /);
 numbers!(F64x8, f64: Add add +, Sub sub -, Mul mul *, Div div /);
-numbers!(I32x8, i32: Add add +, Sub sub -, Mul mul *, BitOr bitor |, BitAnd bitand &);
+numbers!(I32x8, i32: Add add +, Sub sub -, Mul mul *, BitOr bitor |, BitAnd bitand &, BitXor bitxor ^);
 
 impl F32x8 {
     /// Zeros.
@@ -157,6 +157,15 @@ impl F32x8 {
     #[inline(always)]
     pub fn equal(self, other: Self) -> Mask8 {
         Mask8(lanes!(0_u32, i => if self.0[i] == other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Rounds numbers less than 2^22 from zero to the nearest whole ones, of two equally near to the even one.
+    #[must_use]
+    #[inline(always)]
+    pub fn nearest(self) -> I32x8 {
+        // Adding 1.5 * 2^23 leaves whole numbers in the low bits, above what the sum's exponent says.
+        const SHIFT: f32 = 12_582_912.0;
+        I32x8(lanes!(0, i => (self.0[i] + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32))
     }
 
     /// Puts zero in place of what is not finite.
@@ -253,6 +262,13 @@ impl F64x8 {
         I32x8(lanes!(0, i => (self.0[i] + 6_755_399_441_055_744.0).to_bits() as i32))
     }
 
+    /// Rounds numbers less than 2^31 from zero down to whole ones.
+    #[must_use]
+    #[inline(always)]
+    pub fn nearest_below(self) -> I32x8 {
+        F64x8(lanes!(0.0, i => self.0[i].floor())).nearest()
+    }
+
     /// Rounds to single precision.
     #[must_use]
     #[inline(always)]
@@ -281,6 +297,62 @@ impl I32x8 {
     #[inline(always)]
     pub fn to_f64(self) -> F64x8 {
         F64x8(lanes!(0.0, i => f64::from(self.0[i])))
+    }
+
+    /// Turns them into numbers in single precision; what lies beyond 2^24 is rounded.
+    #[must_use]
+    #[inline(always)]
+    pub fn to_f32(self) -> F32x8 {
+        F32x8(lanes!(0.0, i => self.0[i] as f32))
+    }
+
+    /// Shifts bits up; only the five lowest bits of the count matter.
+    #[must_use]
+    #[inline(always)]
+    pub fn up(self, by: Self) -> Self {
+        Self(lanes!(0, i => self.0[i].wrapping_shl(by.0[i] as u32)))
+    }
+
+    /// Shifts bits down and zeros in; only the five lowest bits of the count matter.
+    #[must_use]
+    #[inline(always)]
+    pub fn down(self, by: Self) -> Self {
+        Self(lanes!(0, i => (self.0[i] as u32).wrapping_shr(by.0[i] as u32) as i32))
+    }
+
+    /// Returns the smaller ones.
+    #[must_use]
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self(lanes!(0, i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+
+    /// Returns the larger ones.
+    #[must_use]
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self(lanes!(0, i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+
+    /// Tells which are less.
+    #[must_use]
+    #[inline(always)]
+    pub fn below(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] < other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Tells which are equal.
+    #[must_use]
+    #[inline(always)]
+    pub fn equal(self, other: Self) -> Mask8 {
+        Mask8(lanes!(0_u32, i => if self.0[i] == other.0[i] { u32::MAX } else { 0 }))
+    }
+
+    /// Takes `yes` where the mask is set, else `no`.
+    #[must_use]
+    #[inline(always)]
+    pub fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
+        Self(lanes!(0, i => (yes.0[i] & mask.0[i] as i32) | (no.0[i] & !(mask.0[i] as i32))))
     }
 }
 
@@ -536,6 +608,14 @@ mod tests {
         assert_eq!((Mask8::first(3).count(), Mask8::ALL.count()), (3, 8));
         let halves = F64x8([0.5, -0.5, 1.5, 2.4, -2.6, 1e9, -1e9, 0.0]);
         assert_eq!(halves.nearest().0, [0, 0, 2, 2, -3, 1_000_000_000, -1_000_000_000, 0]);
+        let single = F32x8([0.5, -0.5, 1.5, 2.4, -2.6, 4e6, -4e6, 0.0]);
+        assert_eq!(single.nearest().0, [0, 0, 2, 2, -3, 4_000_000, -4_000_000, 0]);
+        let (low, high) = (I32x8::splat(-3), I32x8::count_from(-5));
+        assert_eq!(high.max(low).min(I32x8::splat(0)).0, [-3, -3, -3, -2, -1, 0, 0, 0]);
+        assert_eq!(I32x8::pick(high.below(low) | high.equal(low), low, high), high.max(low));
+        assert_eq!((I32x8::splat(5).up(I32x8::count_from(0)) ^ I32x8::splat(1)).0[..3], [4, 11, 21]);
+        assert_eq!(I32x8::splat(-1).down(I32x8::count_from(28)).0[..4], [15, 7, 3, 1]);
+        assert_eq!(count.to_f32().0[0], -3.0);
         let turn = glam::DMat3::from_rotation_z(0.3);
         let turned = DVec3x8::splat(glam::DVec3::new(1.0, 2.0, 3.0)).turned(&turn);
         assert_eq!(turned.get(5), turn * glam::DVec3::new(1.0, 2.0, 3.0));

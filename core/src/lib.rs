@@ -20,3 +20,4 @@ pub mod parallel;
 pub mod scene;
 pub mod seam;
 pub mod shade;
+pub mod stream;

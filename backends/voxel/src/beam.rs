@@ -7,7 +7,9 @@
 
 use crate::grid::Layer;
 use crate::walk::GridRay;
+use crate::walk::packet::GridRays;
 use glam::{DAffine3, DVec3};
+use polyptych_core::lanes::F64x8;
 use polyptych_core::math::Aabb;
 
 /// Rays in the world: every origin may go with every direction.
@@ -190,6 +192,12 @@ impl Span {
     #[inline(always)]
     pub(crate) fn distances(&self, ray: &GridRay) -> (f64, f64) {
         (ray.plane_of(self.axis, self.near), ray.plane_of(self.axis, self.far))
+    }
+
+    /// Does the same for eight rays.
+    #[inline(always)]
+    pub(crate) fn eight_distances(&self, rays: &GridRays) -> (F64x8, F64x8) {
+        (rays.plane_of(self.axis, self.near), rays.plane_of(self.axis, self.far))
     }
 }
 

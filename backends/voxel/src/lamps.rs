@@ -56,6 +56,16 @@ impl Lamp {
         }
     }
 
+    /// Returns what arrives everywhere, for light that is parallel.
+    pub(crate) fn everywhere(&self) -> Option<Option<Arriving>> {
+        self.everywhere
+    }
+
+    /// Tells whether an emissive cell gives off the light.
+    pub(crate) fn is_cell(&self) -> bool {
+        self.cell.is_some()
+    }
+
     /// Returns the direction to a light that is parallel.
     pub(crate) fn direction(&self) -> Option<DVec3> {
         self.everywhere.flatten().map(|arriving| arriving.to_light)

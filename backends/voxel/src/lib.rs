@@ -8,15 +8,22 @@
 //! - [`Voxel`] is the renderer, [`Factory`] makes it for a registry.
 //! - `occupancy` answers where in a chunk is nothing, `grid` puts chunks together and keeps them over edits.
 //! - `beam` finds where the rays of a tile can meet anything; `paint` draws the tiles.
-//! - `walk` follows one ray through one grid; `world` finds what a ray meets among many; `trace` colors it.
+//! - `walk` follows one ray through one grid, or eight at once; `world` and `octet` find what they meet among many;
+//!   `trace` and `light` color it.
 //!
-//! Colors are drawn with one sample a pixel, through its middle, whatever number is needed.
+//! Rays of the eye and those toward lights go in packets of eight neighbors, in single precision with the steps that it
+//! leaves in doubt taken in double; what goes on through glass, or comes from a mirror, goes alone. The parameter `walk`
+//! chooses other numbers.
+//!
+//! Colors are the mean of as many samples as are needed; all else is that of the ray through a pixel's middle.
 
 mod beam;
 mod grid;
 mod lamps;
+mod light;
 mod model;
 mod occupancy;
+mod octet;
 mod paint;
 mod plan;
 mod renderer;

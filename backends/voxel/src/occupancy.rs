@@ -29,35 +29,45 @@ impl Values {
 /// every mask by index alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Occupancy {
-    top: u64,
-    middle: [u64; 64],
-    bottom: [u64; 4096],
+    pub(crate) top: [u32; 2],
+    pub(crate) middle: [u32; 2 * 64],
+    pub(crate) bottom: [u32; 2 * 4096],
 }
 
-/// Bits of the 2^3 children around the first, in the order of [`child`].
-const OCTET: u64 = 0x0033_0033;
-
-/// Returns the bit of a cell's block of `4^n` cells within the node above it, `shift` = 2n: x fastest, then y.
+/// Returns the number of a cell's block of `4^n` cells within the node above it, `shift` = 2n: x fastest, then y.
+/// A node's mask is two words: the fifth bit of the number says which.
 #[inline(always)]
 fn child([x, y, z]: [u32; 3], shift: u32) -> usize {
     ((x >> shift & 3) | (y >> shift & 3) << 2 | (z >> shift & 3) << 4) as usize
 }
 
+/// Tells whether a node's word has the bit of a child.
+#[inline(always)]
+fn has(word: u32, child: usize) -> bool {
+    word >> (child & 31) & 1 == 1
+}
+
 /// Returns the exponent of the empty block around an empty child: its own, or one more where all of its octet is
 /// empty.
 #[inline(always)]
-fn empty(mask: u64, child: usize, exponent: u32) -> u32 {
-    exponent + u32::from(mask >> (child & 0b10_1010) & OCTET == 0)
+fn empty(word: u32, child: usize, exponent: u32) -> u32 {
+    exponent + u32::from(word >> (child & 0b0_1010) & Occupancy::OCTET == 0)
 }
 
 impl Occupancy {
+    /// Bits of the 2^3 children around the first, in the order of [`child`].
+    pub(crate) const OCTET: u32 = 0x0033_0033;
+
+    /// Nothing is marked.
+    pub(crate) const EMPTY: Self = Self { top: [0; 2], middle: [0; 2 * 64], bottom: [0; 2 * 4096] };
+
     /// Edge of everything it describes, as an exponent of two.
     pub(crate) const EXPONENT: u32 = CHUNK.trailing_zeros();
 
     /// Marks the cells of a chunk that hold a wanted value; cells from `end` on lie outside of the grid and are
     /// empty. Nothing where no cell is marked.
     pub(crate) fn of(chunk: &Chunk, end: [u32; 3], wanted: &Values) -> Option<Box<Self>> {
-        let mut marks = Box::new(Self { top: 0, middle: [0; 64], bottom: [0; 4096] });
+        let mut marks = Box::new(Self::EMPTY);
         match chunk {
             Chunk::Uniform(value) => {
                 if !wanted.has(*value) {
@@ -75,7 +85,7 @@ impl Occupancy {
                 });
             }
         }
-        (marks.top != 0).then_some(marks)
+        (marks.top != [0; 2]).then_some(marks)
     }
 
     /// Fills the tree from rows of 64 cells along x; `row` counts y first, then z.
@@ -92,22 +102,73 @@ impl Occupancy {
                     if four != 0 {
                         let cell = [x, y, z];
                         let (high, low) = (child(cell, 4), child(cell, 2));
-                        self.bottom[high << 6 | low] |= four << child(cell, 0);
-                        self.middle[high] |= 1 << low;
-                        self.top |= 1 << high;
+                        let bit = child(cell, 0);
+                        self.bottom[(high << 6 | low) << 1 | bit >> 5] |= (four as u32) << (bit & 31);
+                        self.middle[high << 1 | low >> 5] |= 1 << (low & 31);
+                        self.top[high >> 5] |= 1 << (high & 31);
                     }
                 }
             }
         }
     }
 
+    /// Tells whether nothing is marked.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.top == [0; 2]
+    }
+
+    /// Marks anew what became another byte: blocks of 4^3 cells in which something did.
+    pub(crate) fn renew(&mut self, (old, new): (&[u8], &[u8]), end: [u32; 3], wanted: &Values) {
+        const ROW: usize = CHUNK as usize;
+        let wanted: [bool; 256] = std::array::from_fn(|v| wanted.has(v as u8));
+        // Slabs of a layer first: most are as they were, and comparing is as fast as reading.
+        for z in 0..end[2] as usize {
+            let slab = z * ROW * ROW..(z + 1) * ROW * ROW;
+            if old[slab.clone()] == new[slab.clone()] {
+                continue;
+            }
+            for y in 0..end[1] as usize {
+                let row = slab.start + y * ROW..slab.start + (y + 1) * ROW;
+                if old[row.clone()] == new[row.clone()] {
+                    continue;
+                }
+                for x in (0..ROW).step_by(4) {
+                    let four = row.start + x..row.start + x + 4;
+                    if old[four.clone()] != new[four.clone()] {
+                        let bits = new[four]
+                            .iter()
+                            .enumerate()
+                            .filter(|(i, v)| x + i < end[0] as usize && wanted[usize::from(**v)]);
+                        let bits = bits.fold(0, |bits, (i, _)| bits | 1u32 << i);
+                        self.put_four([x as u32, y as u32, z as u32], bits);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Marks four cells along x as their bits say, and what lies above them.
+    fn put_four(&mut self, cell: [u32; 3], bits: u32) {
+        let (high, low, bit) = (child(cell, 4), child(cell, 2), child(cell, 0));
+        let put = |word: &mut u32, child: usize, is_set: bool| {
+            *word = *word & !(1 << (child & 31)) | u32::from(is_set) << (child & 31);
+        };
+        let node = (high << 6 | low) << 1;
+        let word = &mut self.bottom[node | bit >> 5];
+        *word = *word & !(0xf << (bit & 31)) | bits << (bit & 31);
+        let is_set = self.bottom[node] | self.bottom[node | 1] != 0;
+        put(&mut self.middle[high << 1 | low >> 5], low, is_set);
+        let is_set = self.middle[high << 1] | self.middle[high << 1 | 1] != 0;
+        put(&mut self.top[high >> 5], high, is_set);
+    }
+
     /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells around a cell.
     pub(crate) fn has_block(&self, cell: [u32; 3], exponent: u32) -> bool {
-        let high = child(cell, 4);
+        let (high, low) = (child(cell, 4), child(cell, 2));
         match exponent {
-            2 => self.middle[high] >> child(cell, 2) & 1 == 1,
-            4 => self.top >> high & 1 == 1,
-            _ => self.top != 0,
+            2 => has(self.middle[high << 1 | low >> 5], low),
+            4 => has(self.top[high >> 5], high),
+            _ => self.top != [0; 2],
         }
     }
 
@@ -116,17 +177,18 @@ impl Occupancy {
     #[inline(always)]
     pub(crate) fn empty_around(&self, cell: [u32; 3]) -> Option<u32> {
         let high = child(cell, 4);
-        if self.top >> high & 1 == 0 {
-            return Some(empty(self.top, high, 4));
+        let word = self.top[high >> 5];
+        if !has(word, high) {
+            return Some(if self.top == [0; 2] { Self::EXPONENT } else { empty(word, high, 4) });
         }
         let low = child(cell, 2);
-        let mask = self.middle[high];
-        if mask >> low & 1 == 0 {
-            return Some(empty(mask, low, 2));
+        let word = self.middle[high << 1 | low >> 5];
+        if !has(word, low) {
+            return Some(empty(word, low, 2));
         }
         let bit = child(cell, 0);
-        let mask = self.bottom[high << 6 | low];
-        if mask >> bit & 1 == 0 { Some(empty(mask, bit, 0)) } else { None }
+        let word = self.bottom[(high << 6 | low) << 1 | bit >> 5];
+        if has(word, bit) { None } else { Some(empty(word, bit, 0)) }
     }
 }
 

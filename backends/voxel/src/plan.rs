@@ -14,19 +14,19 @@ use std::sync::Arc;
 /// Nanoseconds on one thread of the machine that all back ends' constants were measured on.
 mod nanoseconds {
     /// A pixel.
-    pub(super) const PIXEL: f64 = 10.0;
+    pub(super) const PIXEL: f64 = 6.0;
     /// A ray into a grid, and each doubling of its cells.
-    pub(super) const GRID: f64 = 10.0;
-    pub(super) const DOUBLING: f64 = 14.0;
+    pub(super) const GRID: f64 = 4.0;
+    pub(super) const DOUBLING: f64 = 4.0;
     /// How much longer a ray walks through what it does not end in.
     pub(super) const CLEAR: f64 = 6.0;
     /// A surface, lit.
-    pub(super) const SURFACE: f64 = 70.0;
+    pub(super) const SURFACE: f64 = 25.0;
     /// A light on it.
-    pub(super) const LIGHT: f64 = 30.0;
+    pub(super) const LIGHT: f64 = 10.0;
 }
 
-pub(crate) fn plan(scene: &Scene, need: &Need, resolution: u32, shadows: Shadows) -> Plan {
+pub(crate) fn plan(scene: &Scene, need: &Need, [resolution, samples]: [u32; 2], shadows: Shadows) -> Plan {
     let lamps = Lamp::all(scene);
     let (mut known, mut cells) = (HashSet::new(), vec![0.0; scene.objects.len()]);
     let objects: Vec<ObjectPlan> = scene
@@ -45,11 +45,16 @@ pub(crate) fn plan(scene: &Scene, need: &Need, resolution: u32, shadows: Shadows
     let mut passes = vec![PassPlan {
         name: "primary rays".to_owned(),
         needed: true,
-        why: "one through the middle of each pixel".to_owned(),
+        why: match samples {
+            1 => "one through the middle of each pixel".to_owned(),
+            _ => format!("one through the middle of each pixel, and {samples} for its color"),
+        },
     }];
     passes.extend(demand.passes());
     passes.push(demand.shadow_rays());
-    Plan { estimated_ms: milliseconds(scene, need, &demand, &cells), objects, passes, bytes }
+    let rays = if samples > 1 { samples + 1 } else { 1 };
+    let estimated_ms = milliseconds(scene, need, &demand, &cells) * f64::from(rays);
+    Plan { estimated_ms, objects, passes, bytes }
 }
 
 /// `cells` are those along the longest edge of each object's grid.

@@ -4,10 +4,11 @@ use crate::grid::{Chunks, Grid};
 use crate::lamps::Lamp;
 use crate::model::{self, Model};
 use crate::occupancy::Values;
-use crate::paint::{Painter, TILE};
+use crate::paint::{Painter, Pattern, TILE};
 use crate::plan::plan;
 use crate::trace::{Shadows, Tracer};
-use crate::world::{Counts, Item, World};
+use crate::world::{Counts, Item, Numbers, World};
+use polyptych_core::camera::Camera;
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::scene::{AlphaMode, Scene, ShapeKind};
@@ -39,6 +40,22 @@ pub struct Voxel {
     info: BackendInfo,
     ready: Option<Ready>,
     chunks: Chunks,
+    pub(crate) last: Option<Half>,
+    /// Counts frames: which half is drawn first changes from one to the next.
+    pub(crate) halves: u32,
+}
+
+/// Most rays for the color of a pixel.
+const MOST_SAMPLES: i64 = 64;
+
+/// What the last frame drew of a picture of which every other pixel is drawn at once.
+#[derive(Clone, Debug)]
+pub(crate) struct Half {
+    /// Of the picture; see [`Framebuffer::stamp`].
+    stamp: u64,
+    camera: Camera,
+    first: u32,
+    is_whole: bool,
 }
 
 #[derive(Debug)]
@@ -50,6 +67,8 @@ struct Ready {
     bounces: u32,
     shadows: Shadows,
     chunks_built: u64,
+    checkerboard: bool,
+    samples: u32,
 }
 
 impl Default for Voxel {
@@ -62,11 +81,25 @@ impl Voxel {
     /// Makes an instance that has nothing prepared.
     #[must_use]
     pub fn new() -> Self {
-        Self { info: info(), ready: None, chunks: Chunks::default() }
+        Self { info: info(), ready: None, chunks: Chunks::default(), last: None, halves: 0 }
     }
 
     fn resolution(&self, need: &Need) -> u32 {
         need.settings.int(&self.info.parameters, "detail.resolution").clamp(16, 1024) as u32
+    }
+
+    fn walk(&self, need: &Need) -> Numbers {
+        match need.settings.text(&self.info.parameters, "walk") {
+            "fast" => Numbers::Fast,
+            "f64" => Numbers::Double,
+            "fixed" => Numbers::Fixed,
+            _ => Numbers::Exact,
+        }
+    }
+
+    fn samples(&self, need: &Need) -> u32 {
+        let asked = need.settings.int(&self.info.parameters, "samples").clamp(1, MOST_SAMPLES) as u32;
+        need.samples.max(asked).min(MOST_SAMPLES as u32)
     }
 
     fn shadows(&self, need: &Need) -> Shadows {
@@ -89,9 +122,8 @@ impl Voxel {
             let without_holes =
                 (1..=255).all(|v| material(v).alpha == AlphaMode::Opaque || material(v).texture.is_none());
             let key = (Arc::as_ptr(&object.shape).addr(), seen, blocking);
-            let grid = grids
-                .entry(key)
-                .or_insert_with(|| Arc::new(self.chunks.grid(voxels, seen, blocking, control.threads)));
+            let grid =
+                grids.entry(key).or_insert_with(|| self.chunks.grid(voxels, seen, blocking, control.threads));
             items.push(Item::new(scene, index, grid.clone(), without_holes));
         }
         Ok((items, grids.values().map(|g| g.bytes()).sum()))
@@ -115,6 +147,33 @@ fn info() -> BackendInfo {
                 help: "Most cells along the longest edge of an object that is converted",
                 tag: "detail.tolerance",
                 quality_axis: true,
+            },
+            Parameter {
+                name: "walk",
+                kind: ParameterKind::Choice { choices: &["fast", "exact", "f64", "fixed"] },
+                default: Value::Text("exact".to_owned()),
+                unit: "",
+                help: "Numbers that rays are walked in",
+                tag: "",
+                quality_axis: true,
+            },
+            Parameter {
+                name: "samples",
+                kind: ParameterKind::Int { min: 1, max: MOST_SAMPLES },
+                default: Value::Int(1),
+                unit: "",
+                help: "Rays that the color of a pixel is the mean of",
+                tag: "samples",
+                quality_axis: true,
+            },
+            Parameter {
+                name: "checkerboard",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(false),
+                unit: "",
+                help: "Draw every other pixel of a moving picture, and the rest when it rests; with one sample",
+                tag: "",
+                quality_axis: false,
             },
             Parameter {
                 name: "bounces",
@@ -144,7 +203,7 @@ impl Renderer for Voxel {
     }
 
     fn plan(&self, scene: &Scene, need: &Need) -> Plan {
-        plan(scene, need, self.resolution(need), self.shadows(need))
+        plan(scene, need, [self.resolution(need), self.samples(need)], self.shadows(need))
     }
 
     fn prepare(
@@ -154,7 +213,7 @@ impl Renderer for Voxel {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
-        self.ready = None;
+        (self.ready, self.last) = (None, None);
         let model = model::build(scene, need, self.resolution(need), converter, control)?;
         self.chunks.begin();
         let (items, grid_bytes) = self.items(&model, control)?;
@@ -169,7 +228,7 @@ impl Renderer for Voxel {
         for (lamp, shadow) in lamps.iter_mut().zip(&demand.shadows) {
             lamp.is_blocked = shadow.is_ok();
         }
-        let world = World::new(model.scene, items, lamps);
+        let world = World::new(model.scene, items, lamps, self.walk(need));
         let bytes = world.bytes() + grid_bytes + self.chunks.bytes();
         let decisions: Arc<[Decision]> = model.decisions.into();
         self.ready = Some(Ready {
@@ -180,6 +239,10 @@ impl Renderer for Voxel {
             bounces: need.settings.int(&self.info.parameters, "bounces").clamp(0, 8) as u32,
             shadows: self.shadows(need),
             chunks_built: self.chunks.built,
+            // Many rays a pixel are for pictures that rest.
+            checkerboard: need.settings.bool(&self.info.parameters, "checkerboard")
+                && self.samples(need) == 1,
+            samples: self.samples(need),
         });
         Ok(Prepared { objects: decisions, bytes })
     }
@@ -196,7 +259,21 @@ impl Renderer for Voxel {
     ) -> Result<Report, RenderError> {
         let ready = self.ready.as_ref().ok_or(RenderError::NotPrepared)?;
         let mut phases = Phases::start();
-        let painter = Painter::new(&frame.camera, target);
+        let last = self.last.take();
+        let same = last.filter(|last| Some(last.stamp) == target.stamp() && last.camera == frame.camera);
+        if let Some(last) = same.as_ref().filter(|last| last.is_whole && ready.checkerboard) {
+            // Both halves are there.
+            self.last = Some(last.clone());
+            let counters = [const { None }; 6];
+            return Ok(Report { objects: ready.decisions.clone(), phases, counters, bytes: ready.bytes });
+        }
+        self.halves = self.halves.wrapping_add(1);
+        let pattern = match &same {
+            _ if !ready.checkerboard => Pattern::Whole,
+            Some(last) => Pattern::Half { first: last.first ^ 1, fills: false },
+            None => Pattern::Half { first: self.halves & 1, fills: true },
+        };
+        let painter = Painter::new(&frame.camera, target, pattern, ready.samples);
         let [rays, shadow_rays, steps] = [const { AtomicU64::new(0) }; 3];
         let stopped = AtomicBool::new(false);
         target.for_each_band(control.threads, TILE, &|mut band| {
@@ -220,13 +297,22 @@ impl Renderer for Voxel {
             return Err(RenderError::Cancelled);
         }
         phases.end("trace");
+        if let Pattern::Half { first, fills } = pattern {
+            let half = |stamp| Half { stamp, camera: frame.camera.clone(), first, is_whole: !fills };
+            self.last = target.stamp().map(half);
+        }
+        let filled = if matches!(pattern, Pattern::Half { fills: true, .. }) {
+            u64::from(target.width()) * u64::from(target.height()) / 2
+        } else {
+            0
+        };
         let counter = |name, count| Some(Counter { name, count });
         let counters = [
             counter("rays", rays.into_inner()),
             counter("shadow rays", shadow_rays.into_inner()),
             counter("steps", steps.into_inner()),
             counter("chunks built", ready.chunks_built),
-            None,
+            (filled > 0).then_some(Counter { name: "pixels filled in", count: filled }),
             None,
         ];
         Ok(Report { objects: ready.decisions.clone(), phases, counters, bytes: ready.bytes })

@@ -383,3 +383,71 @@ fn hosts_that_hurry_or_stop_are_answered() {
     assert_eq!(cancelled.unwrap_err(), RenderError::Cancelled);
     voxel.render(&need.frame(), &mut picture, &Control::simple()).unwrap();
 }
+
+#[test]
+fn a_board_of_pixels_is_whole_at_rest_and_without_ghosts_in_motion() {
+    let scene = varied();
+    for camera in [around(), Camera { projection: Projection::Fisheye { fov: 2.0 }, ..around() }] {
+        for (width, height) in [(67, 35), (1, 9), (17, 1), (16, 16)] {
+            let whole = draw(&scene, &need(camera.clone(), width, height));
+            let mut moved = camera.clone();
+            moved.eye += DVec3::new(3.0, 1.0, -2.0);
+            let mut need = need(moved, width, height);
+            need.settings.set("voxel", &Factory.info().parameters, "checkerboard", "on").unwrap();
+            let mut voxel = Voxel::new();
+            let prepared = Arc::new(scene.clone());
+            voxel.prepare(&prepared, &need, &Converter::default(), &Control::simple()).unwrap();
+            let mut picture = Framebuffer::new(width, height, Channels::ALL);
+            let mut frame = need.frame();
+            voxel.render(&frame, &mut picture, &Control::simple()).unwrap();
+            voxel.render(&frame, &mut picture, &Control::simple()).unwrap();
+            // The camera moves: half of the pixels are drawn, and the others say nothing of frames before.
+            frame.camera = camera.clone();
+            voxel.render(&frame, &mut picture, &Control::simple()).unwrap();
+            let mut fresh = Framebuffer::new(width, height, Channels::ALL);
+            let mut other = picture.clone();
+            voxel.last = None;
+            voxel.halves += 1;
+            voxel.render(&frame, &mut fresh, &Control::simple()).unwrap();
+            assert!(fresh.same_bits(&picture), "{width}x{height}");
+            let same = (0..whole.id().len()).filter(|&i| whole.color()[i] == picture.color()[i]).count();
+            assert!(same * 2 >= whole.id().len() - width.max(height) as usize, "{same} of {width}x{height}");
+            // It rests: the other half comes, and all is as if drawn at once; then there is nothing to do.
+            voxel.render(&frame, &mut fresh, &Control::simple()).unwrap();
+            assert!(fresh.same_bits(&whole), "{width}x{height}");
+            let report = voxel.render(&frame, &mut fresh, &Control::simple()).unwrap();
+            assert!(report.counters.iter().all(Option::is_none) && fresh.same_bits(&whole));
+            // Another picture of the same camera is begun anew.
+            voxel.render(&frame, &mut other, &Control::simple()).unwrap();
+            voxel.render(&frame, &mut other, &Control::simple()).unwrap();
+            assert!(other.same_bits(&whole));
+        }
+    }
+}
+
+#[test]
+fn many_samples_are_the_mean_of_small_pixels() {
+    // A wall behind the left of 5.25 pixels: the sixth is covered by a quarter.
+    let voxels = Voxels::from_fn([21, 128, 1], |_, _, _| 1);
+    let mut scene = scene(voxels, vec![Material { emission: Vec3::ONE, ambient: 0.0, ..matte(Vec3::ZERO) }]);
+    scene.objects[0].world_from_object = DAffine3::from_scale(DVec3::splat(0.25));
+    let picture = |samples: &str, threads: usize| {
+        let mut need = need(from_front(), 32, 32);
+        need.settings.set("voxel", &Factory.info().parameters, "samples", samples).unwrap();
+        let mut voxel = Voxel::new();
+        voxel.prepare(&Arc::new(scene.clone()), &need, &Converter::default(), &Control::simple()).unwrap();
+        let mut picture = Framebuffer::new(32, 32, Channels::ALL);
+        let pool = Pool::new(threads).unwrap();
+        voxel.render(&need.frame(), &mut picture, &Control::new(&pool)).unwrap();
+        picture
+    };
+    let (one, many) = (picture("1", 1), picture("16", 1));
+    assert!(many.same_bits(&picture("16", 3)));
+    for (x, share) in [(0, 1.0), (4, 1.0), (5, 0.25), (6, 0.0), (31, 0.0)] {
+        for y in [0, 7, 31] {
+            let i = y * 32 + x;
+            assert_eq!((many.coverage()[i], many.color()[i]), (share, Vec3::splat(share)), "{x}, {y}");
+            assert_eq!(many.distance()[i], one.distance()[i]);
+        }
+    }
+}

@@ -4,7 +4,8 @@ use crate::beam::{Beam, Bundle, Span};
 use crate::grid::{Grid, Layer};
 use crate::lamps::Lamp;
 use crate::tree::{Tree, WorldRay};
-use crate::walk::{Found, GridRay, Moment, Walk};
+use crate::walk::packet::Order;
+use crate::walk::{Found, GridRay, Moment, Walk, fixed};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use polyptych_core::math::{Aabb, Ray};
 use polyptych_core::scene::{AlphaMode, Material, Scene};
@@ -17,22 +18,47 @@ pub(crate) struct World {
     /// All of its shapes that are drawn are grids.
     pub(crate) scene: Arc<Scene>,
     /// Rising by the index of their objects.
-    items: Vec<Item>,
+    pub(crate) items: Vec<Item>,
     tree: Tree,
     pub(crate) lamps: Vec<Lamp>,
+    pub(crate) walk: Numbers,
+}
+
+/// In which numbers rays of tiles are walked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Numbers {
+    /// In single precision, as it is rounded.
+    Fast,
+    /// In single precision, and in double where that is in doubt.
+    Exact,
+    /// In double precision, ray by ray.
+    Double,
+    /// In fixed point, ray by ray.
+    Fixed,
+}
+
+impl Numbers {
+    /// Returns how eight rays are walked at once, if they are.
+    pub(crate) fn order(self) -> Option<Order> {
+        match self {
+            Self::Fast => Some(Order::Rounded),
+            Self::Exact => Some(Order::Exact),
+            Self::Double | Self::Fixed => None,
+        }
+    }
 }
 
 /// A grid in its place.
 #[derive(Debug)]
 pub(crate) struct Item {
     pub(crate) object: usize,
-    grid: Arc<Grid>,
-    grid_from_world: DAffine3,
+    pub(crate) grid: Arc<Grid>,
+    pub(crate) grid_from_world: DAffine3,
     /// Unit outward normals of a cell's faces in world space: -x, +x, -y, +y, -z, +z.
-    normals: [DVec3; 6],
-    radius: f64,
+    pub(crate) normals: [DVec3; 6],
+    pub(crate) radius: f64,
     /// Whether each cell that may be seen is seen, so that no texture need be asked for holes.
-    without_holes: bool,
+    pub(crate) without_holes: bool,
 }
 
 /// How many rays were followed, and how many cells and empty blocks they left.
@@ -47,8 +73,8 @@ pub(crate) struct Counts {
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(crate) struct Place {
     pub(crate) t: f64,
-    item: i64,
-    rank: i64,
+    pub(crate) item: i64,
+    pub(crate) rank: i64,
 }
 
 impl Place {
@@ -68,12 +94,12 @@ pub(crate) enum Start<'a> {
 /// A point of a surface from which rays leave.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site {
-    item: usize,
+    pub(crate) item: usize,
     /// In the space of the item's grid, exactly in the face.
-    origin: DVec3,
+    pub(crate) origin: DVec3,
     /// The cell in front of the face, or the one that was entered where a ray began in it.
-    cell: [i32; 3],
-    is_within_solid: bool,
+    pub(crate) cell: [i32; 3],
+    pub(crate) is_within_solid: bool,
 }
 
 /// The surface that a ray met.
@@ -81,13 +107,13 @@ pub(crate) struct Site {
 pub(crate) struct Met {
     pub(crate) place: Place,
     /// Where the walk entered the cell; see [`Walk::point`].
-    origin: DVec3,
+    pub(crate) origin: DVec3,
     /// See [`Walk::cell_before`].
-    cell_before: [i32; 3],
+    pub(crate) cell_before: [i32; 3],
     /// See [`Walk::face`].
-    face: u8,
-    value: u8,
-    began_inside: bool,
+    pub(crate) face: u8,
+    pub(crate) value: u8,
+    pub(crate) began_inside: bool,
 }
 
 impl Met {
@@ -107,7 +133,7 @@ impl Met {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach {
     count: usize,
-    grids: [Option<(u32, Span)>; MOST_GRIDS],
+    pub(crate) grids: [Option<(u32, Span)>; MOST_GRIDS],
 }
 
 /// A tile that sees more grids has its rays go through the tree.
@@ -117,10 +143,6 @@ impl Reach {
     /// Tells whether there is nothing to be met.
     pub(crate) fn is_empty(&self) -> bool {
         self.count == 0
-    }
-
-    fn iter(&self) -> impl Iterator<Item = (usize, &Span)> {
-        self.grids.iter().flatten().map(|(index, span)| (*index as usize, span))
     }
 }
 
@@ -141,7 +163,7 @@ pub(crate) struct Point<'a> {
 
 /// Rays to other grids leave a surface this share of the largest number at hand above it: far above rounding
 /// (2e-16), far below any cell.
-const LIFT: f64 = 1e-10;
+pub(crate) const LIFT: f64 = 1e-10;
 
 /// Returns the outward normal of a cell's face in the space of its grid.
 fn outward(face: usize) -> DVec3 {
@@ -189,7 +211,7 @@ impl Item {
 }
 
 impl World {
-    pub(crate) fn new(scene: Arc<Scene>, items: Vec<Item>, lamps: Vec<Lamp>) -> Self {
+    pub(crate) fn new(scene: Arc<Scene>, items: Vec<Item>, lamps: Vec<Lamp>, walk: Numbers) -> Self {
         let boxes: Vec<Aabb> = items
             .iter()
             .map(|item| {
@@ -198,7 +220,7 @@ impl World {
                 bounds.grown(largest * 1e-12 + f64::MIN_POSITIVE)
             })
             .collect();
-        Self { scene, tree: Tree::new(&boxes), items, lamps }
+        Self { scene, tree: Tree::new(&boxes), items, lamps, walk }
     }
 
     /// Returns what [`World::bytes`] will be for so many objects and lights.
@@ -229,25 +251,30 @@ impl World {
         is_whole.then_some(reach)
     }
 
-    /// Finds the first surface that a ray from the eye meets, among what its tile can reach.
+    /// Finds the first surface that a ray from the eye meets in one grid, before a distance.
+    pub(crate) fn meet_grid(
+        &self,
+        index: usize,
+        span: &Span,
+        ray: &Ray,
+        before: f64,
+        counts: &Counts,
+    ) -> Option<Met> {
+        let item = &self.items[index];
+        let grid_ray = item.grid_ray(ray)?;
+        let (enter, leave) = span.distances(&grid_ray);
+        let moment = if enter > 0.0 { Moment::before(enter) } else { Moment::START };
+        let walk = Walk::begin(grid_ray, item.grid.seen.size, moment)?;
+        self.first_surface(index, walk, None, Place::START, before.min(leave), counts)
+    }
+
+    /// Goes on to the first marked cell in the numbers that were chosen.
     #[inline(always)]
-    pub(crate) fn meet_within(&self, ray: &Ray, reach: &Reach, counts: &Counts) -> Option<Met> {
-        let mut best: Option<Met> = None;
-        for (index, span) in reach.iter() {
-            let item = &self.items[index];
-            let Some(grid_ray) = item.grid_ray(ray) else { continue };
-            let (enter, leave) = span.distances(&grid_ray);
-            let moment = if enter > 0.0 { Moment::before(enter) } else { Moment::START };
-            let Some(walk) = Walk::begin(grid_ray, item.grid.seen.size, moment) else { continue };
-            let before = best.map_or(f64::INFINITY, |met| met.place.t).min(leave);
-            let found = self.first_surface(index, walk, None, Place::START, before, counts);
-            if let Some(met) = found
-                && best.is_none_or(|best| met.place < best.place)
-            {
-                best = Some(met);
-            }
+    fn find_marked(&self, walk: &mut Walk, layer: &Layer, before: f64) -> Found {
+        if self.walk == Numbers::Fixed {
+            return fixed::find_marked(walk, layer, before);
         }
-        best
+        walk.find_marked(layer, before)
     }
 
     /// Finds the first surface behind a place.
@@ -281,7 +308,7 @@ impl World {
     ) -> Option<Met> {
         let item = &self.items[index];
         let found = loop {
-            let marked = walk.find_marked(&item.grid.seen, before);
+            let marked = self.find_marked(&mut walk, &item.grid.seen, before);
             let Found::Marked { passed_empty } = marked else { break None };
             let value = item.grid.value(walk.cell());
             // Cells of one value are one body: only its outside is a surface.
@@ -357,7 +384,7 @@ impl World {
     }
 
     #[inline(always)]
-    fn blocks(
+    pub(crate) fn blocks(
         &self,
         index: usize,
         ray: &Ray,
@@ -381,7 +408,9 @@ impl World {
         // The cell in front of a surface was passed before: what it holds let the ray through.
         let mut previous = (own && !site.is_within_solid).then(|| item.grid.value(walk.cell()));
         let blocked = loop {
-            let Found::Marked { passed_empty } = walk.find_marked(layer, last) else { break false };
+            let Found::Marked { passed_empty } = self.find_marked(&mut walk, layer, last) else {
+                break false;
+            };
             if walk.t >= before {
                 break false;
             }
@@ -400,14 +429,6 @@ impl World {
         };
         counts.steps.set(counts.steps.get() + u64::from(walk.steps));
         blocked
-    }
-
-    /// Grows a box to hold the points from which shadow rays leave a surface that a ray met.
-    #[inline(always)]
-    pub(crate) fn with_site(&self, sites: Aabb, ray: &Ray, met: &Met) -> Aabb {
-        let position = ray.at(met.place.t);
-        let lift = self.items[met.place.item as usize].reach_of(position, met.place.t) * LIFT;
-        sites.with(position - lift).with(position + lift)
     }
 
     /// Returns what shading needs of a surface that a ray met.

@@ -166,3 +166,41 @@ fn the_model_of_other_shapes_is_drawn_without_error() {
     let model = voxel.model().unwrap();
     assert_same(&picture, &draw(&mut Reference::new(), &model, &need), name);
 }
+
+/// Counts pixels of which anything differs.
+fn different(a: &Framebuffer, b: &Framebuffer) -> usize {
+    let pixels = 0..a.distance().len();
+    let is_same = |i: usize| {
+        a.distance()[i].to_bits() == b.distance()[i].to_bits()
+            && a.normal()[i] == b.normal()[i]
+            && a.color()[i] == b.color()[i]
+            && a.shadow()[i] == b.shadow()[i]
+    };
+    pixels.filter(|&i| !is_same(i)).count()
+}
+
+#[test]
+fn numbers_of_the_walk_change_nothing_but_where_they_say_so() {
+    let land = Arc::new(scene(3));
+    let (mut pixels, mut off) = (0, [0, 0]);
+    for (name, camera) in cameras() {
+        let picture = |walk: &str| {
+            let mut need = need(camera.clone());
+            let mut voxel = Voxel::new();
+            need.settings.set("voxel", &voxel.info().parameters, "walk", walk).unwrap();
+            draw(&mut voxel, &land, &need)
+        };
+        let double = picture("f64");
+        assert!(
+            picture("exact").same_bits(&double),
+            "{name}: {} pixels",
+            different(&picture("exact"), &double)
+        );
+        for (walk, off) in ["fast", "fixed"].into_iter().zip(&mut off) {
+            *off += different(&picture(walk), &double);
+        }
+        pixels += double.distance().len();
+    }
+    // In the far view light and surfaces meet cells along their edges: which of two is seen is then a matter of rounding.
+    assert!(off[0] * 1000 <= pixels && off[1] * 1000 <= pixels, "{off:?} of {pixels}");
+}

@@ -1,5 +1,6 @@
 //! The scene: what is there, in the representation its author gave, and nothing more.
 
+mod edit;
 mod environment;
 mod form;
 mod height_field;
@@ -11,6 +12,7 @@ mod texture;
 mod volume;
 mod voxels;
 
+pub use edit::{Brush, Edit, History, Region};
 pub use environment::{Background, Environment, Fog, Gradient, LightingModel};
 pub use form::{Form, FreeForm, Perturbation, Power, Quadric};
 pub use height_field::HeightField;

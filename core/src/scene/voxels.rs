@@ -18,6 +18,19 @@ pub struct Voxels {
     chunks: Vec<Chunk>,
 }
 
+impl Chunk {
+    /// Tells whether two chunks are one: the same byte throughout, or the same cells in memory.
+    #[must_use]
+    #[inline]
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Uniform(a), Self::Uniform(b)) => a == b,
+            (Self::Cells(a), Self::Cells(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+}
+
 /// 64^3 cells.
 #[derive(Clone, Debug)]
 pub enum Chunk {
@@ -150,13 +163,36 @@ impl Voxels {
         if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] || self.get(x, y, z) == value {
             return;
         }
-        let index = self.chunk_index(x, y, z);
+        self.cells_mut(self.chunk_index(x, y, z))[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)] = value;
+    }
+
+    /// Returns the cells of a chunk to be changed: a copy, where a clone of the grid holds them, too.
+    pub(super) fn cells_mut(&mut self, index: usize) -> &mut [u8] {
         let chunk = &mut self.chunks[index];
         if let Chunk::Uniform(all) = *chunk {
             *chunk = Chunk::Cells(vec![all; CHUNK_CELLS].into());
         }
         let Chunk::Cells(cells) = chunk else { unreachable!("the chunk was just given cells") };
-        Arc::make_mut(cells)[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)] = value;
+        Arc::make_mut(cells)
+    }
+
+    /// Returns the index of a chunk by its place among chunks.
+    pub(super) fn index_of_chunk(&self, [x, y, z]: [u32; 3]) -> usize {
+        let (cx, cy) = (self.chunks_per_axis[0] as usize, self.chunks_per_axis[1] as usize);
+        (z as usize * cy + y as usize) * cx + x as usize
+    }
+
+    /// Puts a chunk in the place of another.
+    ///
+    /// # Panics
+    /// When there is no such chunk, or it has not as many cells as a chunk has.
+    pub fn put_chunk(&mut self, index: usize, chunk: Chunk) {
+        assert!(
+            matches!(&chunk, Chunk::Uniform(_))
+                || matches!(&chunk, Chunk::Cells(cells) if cells.len() == CHUNK_CELLS),
+            "a chunk has {CHUNK_CELLS} cells"
+        );
+        self.chunks[index] = chunk;
     }
 
     #[inline]
@@ -279,7 +315,7 @@ impl Voxels {
 }
 
 /// Returns where a cell lies in [`Chunk::Cells`]; coordinates are within the chunk.
-fn cell_index(x: u32, y: u32, z: u32) -> usize {
+pub(super) fn cell_index(x: u32, y: u32, z: u32) -> usize {
     ((z * CHUNK + y) * CHUNK + x) as usize
 }
 

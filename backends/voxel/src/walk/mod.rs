@@ -14,6 +14,12 @@
 //! Axes along which the ray descends are mirrored: cell `c` becomes `!c = -1 - c`, so that every ray ascends
 //! and every aligned block stays an aligned block.
 
+pub(crate) mod fixed;
+mod lanes;
+pub(crate) mod packet;
+
+#[cfg(test)]
+mod exactness;
 #[cfg(test)]
 mod tests;
 

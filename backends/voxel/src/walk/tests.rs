@@ -1,11 +1,14 @@
 //! Does the walk in strides visit the cells of the walk over every cell, in the same order, at the same
 //! distances, for every ray?
 
+use super::packet::{GridRays, Order, Packet, Stretch};
 use super::*;
 use crate::grid::{Chunks, Grid};
 use crate::occupancy::Values;
+use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 use polyptych_core::parallel::OneThread;
 use polyptych_core::scene::Voxels;
+use std::sync::Arc;
 
 struct Random(u64);
 
@@ -32,7 +35,7 @@ fn hash(x: u32, y: u32, z: u32) -> u32 {
     h ^ (h >> 16)
 }
 
-fn ready(voxels: &Voxels) -> Grid {
+fn ready(voxels: &Voxels) -> Arc<Grid> {
     let all = Values::of(|_| true);
     Chunks::default().grid(voxels, all, all, &OneThread)
 }
@@ -360,4 +363,67 @@ fn the_point_lies_in_the_face_and_the_cell_before_is_its_neighbor() {
         assert!(point.cmpge(from).all() && point.cmple(from + 1.0).all());
     }
     assert!(hits > 4000, "{hits}");
+}
+
+#[test]
+fn eight_rays_of_the_worst_kinds_meet_what_each_meets_alone() {
+    let mut random = Random(0x2545_f491_4f6c_dd1d);
+    for (name, voxels) in grids() {
+        let grid = ready(&voxels);
+        let size = DVec3::from_array(voxels.size().map(f64::from));
+        let (mut hits, mut refused) = (0, 0);
+        for round in 0..4_000 {
+            let mut origins = DVec3x8::splat(DVec3::ZERO);
+            let mut directions = origins;
+            for lane in 0..LANES {
+                let (origin, direction) = ray(&mut random, size);
+                origins.set(lane, origin);
+                directions.set(lane, direction);
+            }
+            let rays = GridRays::new(origins, directions, Mask8::ALL);
+            // Every other time walks begin late, and end early.
+            let (from, to) = if round % 2 == 0 { (-1.0, f64::INFINITY) } else { (random.next(), 1.0) };
+            let stretch = Stretch { from: F64x8::splat(from), to: F64x8::splat(to) };
+            let mut packet = Packet::begin(&rays, grid.seen.size, &stretch);
+            let mut plain = packet;
+            let found = packet.find_marked(&rays, &grid.seen, Order::Exact);
+            assert_eq!(found, plain.find_marked_plainly(&rays, &grid.seen, Order::Exact));
+            let faces = packet.faces(&rays);
+            for lane in 0..LANES {
+                let (origin, direction) = (origins.get(lane), directions.get(lane));
+                refused += u32::from(packet.refused.has(lane));
+                if packet.refused.has(lane) {
+                    continue;
+                }
+                let moment = if from > 0.0 { Moment::before(from) } else { Moment::START };
+                let alone = GridRay::new(origin, direction)
+                    .and_then(|ray| Walk::begin(ray, grid.seen.size, moment))
+                    .and_then(|mut walk| {
+                        let found = walk.find_marked(&grid.seen, f64::INFINITY);
+                        (found != Found::Nothing).then_some(walk)
+                    });
+                let is_met = found.marked >> lane & 1 == 1;
+                let Some(walk) = alone.filter(|walk| walk.t <= to) else {
+                    // Where walks end is rounded: what lies a little behind may be found.
+                    assert!(!is_met || faces.t.0[lane] > to, "{name}: {origin:?} {direction:?}");
+                    continue;
+                };
+                hits += 1;
+                let cell = [0, 1, 2].map(|a| faces.cell[a].0[lane]);
+                let before = [0, 1, 2].map(|a| faces.before[a].0[lane]);
+                assert!(is_met, "{name}: {origin:?} {direction:?} meets {:?}", walk.cell());
+                assert_eq!(
+                    (cell, before, faces.t.0[lane].to_bits(), faces.point.get(lane)),
+                    (walk.cell(), walk.cell_before(), walk.t.to_bits(), walk.point()),
+                    "{name}: from {origin:?} along {direction:?}"
+                );
+                assert_eq!(
+                    (faces.face.0[lane] as usize, i64::from(faces.rank.0[lane])),
+                    (walk.face(), walk.rank())
+                );
+            }
+        }
+        assert!(hits > 1000 || name == "nothing" || name == "thin", "{name}: {hits} hits");
+        assert!(refused < 3000, "{name}: {refused} refused");
+    }
 }

@@ -1,0 +1,360 @@
+//! What do eight rays meet first, and what stands between eight points and a light?
+//!
+//! The answers of [`World::meet`] and [`World::is_blocked`], eight at a time. What is no plain solid (a texture with
+//! holes, a ray that began in a cell, a grid too long for single precision) is asked of them, ray by ray.
+
+use crate::beam::Span;
+use crate::walk::packet::{GridRays, Packet, Stretch};
+use crate::world::{Counts, LIFT, Met, Place, Reach, Site, World};
+use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
+use polyptych_core::math::Ray;
+
+/// Stands for no grid.
+pub(crate) const NOTHING: u32 = u32::MAX;
+
+/// Rays through eight pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rays {
+    pub(crate) origin: DVec3x8,
+    pub(crate) direction: DVec3x8,
+    pub(crate) there: Mask8,
+}
+
+impl Rays {
+    #[inline(always)]
+    pub(crate) fn one(&self, lane: usize) -> Ray {
+        Ray { origin: self.origin.get(lane), direction: self.direction.get(lane) }
+    }
+}
+
+/// Eight pixels and the surfaces that they see first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Octet {
+    pub(crate) rays: Rays,
+    /// Distances, infinite where nothing is met.
+    pub(crate) t: F64x8,
+    /// Index of each grid among the items of the world, or [`NOTHING`].
+    pub(crate) item: [u32; LANES],
+    /// See [`crate::walk::Walk::face`].
+    pub(crate) face: [u8; LANES],
+    /// Byte of each cell. This, and what follows, is told where it was asked for.
+    pub(crate) value: [u8; LANES],
+    pub(crate) began_inside: Mask8,
+    /// Where the cells were entered, in the space of their grids: exactly in the face.
+    pub(crate) site: DVec3x8,
+    /// See [`crate::walk::Walk::cell_before`].
+    pub(crate) before: [I32x8; 3],
+    /// See [`crate::walk::Walk::rank`].
+    pub(crate) rank: [i32; LANES],
+}
+
+/// Whether more than distances and faces is asked for: the bytes of cells, and where they were entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Bytes {
+    Read,
+    Unread,
+}
+
+/// Sets the lanes whose bits are.
+#[inline(always)]
+fn mask_of(bits: u32) -> Mask8 {
+    let mut mask = Mask8::NONE;
+    for i in 0..LANES {
+        mask.0[i] = 0u32.wrapping_sub(bits >> i & 1);
+    }
+    mask
+}
+
+#[inline(always)]
+fn minimum(a: F64x8, b: F64x8) -> F64x8 {
+    a.min(b)
+}
+
+impl Octet {
+    #[inline(always)]
+    pub(crate) fn nothing(rays: Rays) -> Self {
+        Self {
+            rays,
+            t: F64x8::splat(f64::INFINITY),
+            item: [NOTHING; LANES],
+            face: [0; LANES],
+            value: [0; LANES],
+            began_inside: Mask8::NONE,
+            site: DVec3x8 { x: F64x8::ZERO, y: F64x8::ZERO, z: F64x8::ZERO },
+            before: [I32x8::splat(0); 3],
+            rank: [0; LANES],
+        }
+    }
+
+    /// Tells which pixels see something.
+    #[inline(always)]
+    pub(crate) fn seen(&self) -> Mask8 {
+        let mut seen = Mask8::NONE;
+        for i in 0..LANES {
+            seen.0[i] = if self.item[i] == NOTHING { 0 } else { u32::MAX };
+        }
+        seen
+    }
+
+    /// Returns where the surfaces are in the world.
+    #[inline(always)]
+    pub(crate) fn position(&self) -> DVec3x8 {
+        self.rays.origin + self.rays.direction.scaled(self.t)
+    }
+
+    /// Returns one surface as the walk ray by ray tells it.
+    pub(crate) fn met(&self, lane: usize) -> Option<Met> {
+        let cell = [self.before[0].0[lane], self.before[1].0[lane], self.before[2].0[lane]];
+        (self.item[lane] != NOTHING).then(|| Met {
+            place: Place {
+                t: self.t.0[lane],
+                item: i64::from(self.item[lane]),
+                rank: i64::from(self.rank[lane]),
+            },
+            origin: self.site.get(lane),
+            cell_before: cell,
+            face: self.face[lane],
+            value: self.value[lane],
+            began_inside: self.began_inside.has(lane),
+        })
+    }
+
+    fn put(&mut self, lane: usize, met: &Met) {
+        self.t.0[lane] = met.place.t;
+        self.item[lane] = met.place.item as u32;
+        self.rank[lane] = met.place.rank as i32;
+        self.site.set(lane, met.origin);
+        for a in 0..3 {
+            self.before[a].0[lane] = met.cell_before[a];
+        }
+        self.face[lane] = met.face;
+        self.value[lane] = met.value;
+        self.began_inside.0[lane] = if met.began_inside { u32::MAX } else { 0 };
+    }
+
+    fn site(&self, lane: usize) -> Site {
+        Site {
+            item: self.item[lane] as usize,
+            origin: self.site.get(lane),
+            cell: [self.before[0].0[lane], self.before[1].0[lane], self.before[2].0[lane]],
+            is_within_solid: self.began_inside.has(lane),
+        }
+    }
+}
+
+impl World {
+    /// Finds the first surfaces that rays from the eye meet, among what their tile can reach.
+    #[inline(always)]
+    pub(crate) fn meet_octet(&self, octet: &mut Octet, reach: &Reach, bytes: Bytes, counts: &Counts) {
+        let rays = octet.rays;
+        for (index, span) in reach.grids.iter().flatten() {
+            let (index, item) = (*index, &self.items[*index as usize]);
+            let layer = &item.grid.seen;
+            let Some(order) = self.walk.order().filter(|_| Packet::can(layer.size)) else {
+                self.meet_each(octet, index, span, rays.there, counts);
+                continue;
+            };
+            let map = &item.grid_from_world;
+            let origin = rays.origin.turned(&map.matrix3) + DVec3x8::splat(map.translation);
+            let grid_rays = GridRays::new(origin, rays.direction.turned(&map.matrix3), rays.there);
+            let (from, to) = span.eight_distances(&grid_rays);
+            // Just before the plane: where a ray is then is beyond doubt.
+            let from = from * F64x8::splat(1.0 - 1e-9);
+            let to = minimum(to, octet.t);
+            let mut packet = Packet::begin(&grid_rays, layer.size, &Stretch { from, to });
+            let hits = packet.find_marked(&grid_rays, layer, order);
+            counts.steps.set(counts.steps.get() + u64::from(packet.steps));
+            if hits.marked != 0 {
+                if item.without_holes {
+                    self.take(octet, &grid_rays, &packet, index, mask_of(hits.marked), bytes);
+                } else {
+                    self.meet_each(octet, index, span, mask_of(hits.marked), counts);
+                }
+            }
+            if packet.refused.any() {
+                self.meet_each(octet, index, span, packet.refused, counts);
+            }
+        }
+    }
+
+    /// Asks ray by ray.
+    #[cold]
+    #[inline(never)]
+    fn meet_each(&self, octet: &mut Octet, index: u32, span: &Span, asked: Mask8, counts: &Counts) {
+        for lane in (0..LANES).filter(|&lane| asked.has(lane)) {
+            let old = octet.met(lane);
+            if let Some(new) =
+                self.meet_grid(index as usize, span, &octet.rays.one(lane), octet.t.0[lane], counts)
+                && old.as_ref().is_none_or(|old| new.place < old.place)
+            {
+                octet.put(lane, &new);
+            }
+        }
+    }
+
+    /// Notes the cells that were met where they are nearer than what was met before.
+    #[inline(always)]
+    fn take(
+        &self,
+        octet: &mut Octet,
+        rays: &GridRays,
+        packet: &Packet,
+        index: u32,
+        marked: Mask8,
+        bytes: Bytes,
+    ) {
+        let faces = packet.faces(rays);
+        let mut nearer = octet.t.above(faces.t);
+        for i in 0..LANES {
+            if faces.t.0[i] == octet.t.0[i] && index < octet.item[i] {
+                nearer.0[i] = u32::MAX;
+            }
+        }
+        let taken = marked & nearer;
+        octet.t = F64x8::pick(taken, faces.t, octet.t);
+        for i in 0..LANES {
+            if taken.has(i) {
+                octet.item[i] = index;
+                octet.face[i] = faces.face.0[i] as u8;
+            }
+        }
+        if bytes == Bytes::Unread {
+            return;
+        }
+        octet.site = DVec3x8::pick(taken, faces.point, octet.site);
+        for a in 0..3 {
+            octet.before[a] = I32x8::pick(taken, faces.before[a], octet.before[a]);
+        }
+        octet.began_inside = (octet.began_inside & !taken) | (taken & faces.entered.equal(I32x8::splat(3)));
+        let grid = &self.items[index as usize].grid;
+        for i in 0..LANES {
+            if taken.has(i) {
+                octet.rank[i] = faces.rank.0[i];
+                let cell = [faces.cell[0].0[i], faces.cell[1].0[i], faces.cell[2].0[i]];
+                octet.value[i] = grid.value(cell);
+            }
+        }
+    }
+
+    /// Returns where rays to other grids leave surfaces: a little above them.
+    #[inline(always)]
+    pub(crate) fn lifted(&self, octet: &Octet, normal: DVec3x8) -> DVec3x8 {
+        let position = octet.position();
+        let mut largest = position.x.abs().max(position.y.abs()).max(position.z.abs()).max(octet.t);
+        for i in 0..LANES {
+            if let Some(item) = self.items.get(octet.item[i] as usize) {
+                largest.0[i] = largest.0[i].max(item.radius);
+            }
+        }
+        position + normal.scaled(largest * F64x8::splat(LIFT))
+    }
+
+    /// Tells for which of some surfaces anything blocks the light from a direction, nearer than some distance; `reach`
+    /// are the grids that the rays may meet, where that is known.
+    #[inline(always)]
+    pub(crate) fn blocked_octet(
+        &self,
+        octet: &Octet,
+        (normal, to_light, ends): (DVec3x8, DVec3x8, F64x8),
+        asked: Mask8,
+        reach: Option<&Reach>,
+        counts: &Counts,
+    ) -> Mask8 {
+        let lifted = self.lifted(octet, normal);
+        let (Some(reach), Some(order)) = (reach, self.walk.order()) else {
+            return self.blocked_each(octet, (lifted, to_light, ends), asked, reach, counts);
+        };
+        let mut blocked = Mask8::NONE;
+        for (index, span) in reach.grids.iter().flatten() {
+            let (index, item) = (*index, &self.items[*index as usize]);
+            let layer = &item.grid.blocking;
+            let open = asked & !blocked;
+            if !Packet::can(layer.size) {
+                blocked =
+                    blocked | self.blocked_by(octet, (lifted, to_light, ends), (index, span), open, counts);
+                continue;
+            }
+            let mut own = Mask8::NONE;
+            for i in 0..LANES {
+                own.0[i] = if octet.item[i] == index { open.0[i] } else { 0 };
+            }
+            let map = &item.grid_from_world;
+            let direction = to_light.turned(&map.matrix3);
+            for (lanes, is_own) in [(own, true), (open & !own, false)] {
+                if !lanes.any() {
+                    continue;
+                }
+                let origin = if is_own {
+                    octet.site
+                } else {
+                    lifted.turned(&map.matrix3) + DVec3x8::splat(map.translation)
+                };
+                let rays = GridRays::new(origin, direction, lanes);
+                let to = minimum(span.eight_distances(&rays).1, ends);
+                let mut packet = if is_own {
+                    Packet::begin_in(&rays, layer.size, octet.before, to)
+                } else {
+                    Packet::begin(&rays, layer.size, &Stretch { from: F64x8::ZERO, to })
+                };
+                let hits = packet.find_marked(&rays, layer, order);
+                counts.steps.set(counts.steps.get() + u64::from(packet.steps));
+                let marked = mask_of(hits.marked);
+                let is_plain = item.without_holes;
+                let sure = if is_own { mask_of(hits.passed_empty) & !octet.began_inside } else { Mask8::ALL };
+                let mut met = marked;
+                if (marked & F64x8::splat(f64::INFINITY).above(ends)).any() {
+                    met = met & ends.above(packet.faces(&rays).t);
+                }
+                let sure = if is_plain { sure } else { Mask8::NONE };
+                blocked = blocked | (met & sure);
+                let doubtful = (met & !sure) | packet.refused;
+                if doubtful.any() {
+                    let view = (lifted, to_light, ends);
+                    blocked = blocked | self.blocked_by(octet, view, (index, span), doubtful, counts);
+                }
+            }
+        }
+        blocked
+    }
+
+    /// Asks one grid ray by ray.
+    #[cold]
+    #[inline(never)]
+    fn blocked_by(
+        &self,
+        octet: &Octet,
+        (lifted, to_light, ends): (DVec3x8, DVec3x8, F64x8),
+        (index, span): (u32, &Span),
+        asked: Mask8,
+        counts: &Counts,
+    ) -> Mask8 {
+        let mut blocked = Mask8::NONE;
+        for i in (0..LANES).filter(|&i| asked.has(i)) {
+            let ray = Ray { origin: lifted.get(i), direction: to_light.get(i) };
+            if self.blocks(index as usize, &ray, &octet.site(i), ends.0[i], Some(span), counts) {
+                blocked.0[i] = u32::MAX;
+            }
+        }
+        blocked
+    }
+
+    /// Asks ray by ray.
+    #[inline(never)]
+    fn blocked_each(
+        &self,
+        octet: &Octet,
+        (lifted, to_light, ends): (DVec3x8, DVec3x8, F64x8),
+        asked: Mask8,
+        reach: Option<&Reach>,
+        counts: &Counts,
+    ) -> Mask8 {
+        let mut blocked = Mask8::NONE;
+        for i in (0..LANES).filter(|&i| asked.has(i)) {
+            let ray = Ray { origin: lifted.get(i), direction: to_light.get(i) };
+            if self.is_blocked(&ray, &octet.site(i), ends.0[i], reach, counts) {
+                blocked.0[i] = u32::MAX;
+            }
+        }
+        blocked
+    }
+}

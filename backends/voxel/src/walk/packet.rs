@@ -1,0 +1,611 @@
+//! Which marked cells do eight rays meet first? The walk of [`super::Walk`], eight rays at once, in single precision.
+//!
+//! Rays begin anew at a place within the grid, and so small numbers are enough. With [`Order::Exact`] each step is
+//! taken only where its outcome is beyond doubt: where the place at which a ray leaves a block lies farther from all
+//! other planes than rounding can have moved it. Doubtful steps, one or two in a thousand, are taken in double
+//! precision by [`super::Walk::leave`]. So the cells are those of the walk over single cells in double precision, for
+//! every ray. [`Order::Rounded`] takes places as they are rounded, moved into the block: a few rays in a million then
+//! see a neighbor of their cell.
+
+use super::lanes;
+use super::{GridRay, Walk};
+use crate::grid::Layer;
+use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
+
+/// How the cell behind an empty block is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// As the walk over single cells in double precision finds it.
+    Exact,
+    /// By the rounded place.
+    Rounded,
+}
+
+/// Eight rays in the space of a grid; see [`GridRay`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GridRays {
+    place: [F64x8; 3],
+    origin: [F64x8; 3],
+    direction: [F64x8; 3],
+    inverse: [F64x8; 3],
+    flip: [I32x8; 3],
+    still: [Mask8; 3],
+    /// Those that go somewhere.
+    there: Mask8,
+}
+
+/// Single precision stands for a place by this share of the largest number at hand: the roundings of a place and of
+/// the distance that it is reckoned from are eight of 2^-24 at most.
+const DOUBT: f64 = 8.0 / 16_777_216.0;
+
+/// Grids longer than this are walked in double precision: nearly every step would be in doubt.
+const LONGEST: i32 = 1 << 15;
+
+/// So are rays from as many cells away: double precision then places them no better.
+const FARTHEST: f64 = 1e12;
+
+impl GridRays {
+    /// Makes rays ready; of those that go nowhere, or are not finite, none is there.
+    #[inline(always)]
+    pub(crate) fn new(origin: DVec3x8, direction: DVec3x8, there: Mask8) -> Self {
+        let (zero, infinity) = (F64x8::ZERO, F64x8::splat(f64::INFINITY));
+        let place = [origin.x, origin.y, origin.z];
+        let given = [direction.x, direction.y, direction.z];
+        let mut rays = Self {
+            place,
+            origin: [F64x8::splat(-1.0); 3],
+            direction: [zero; 3],
+            inverse: [infinity; 3],
+            flip: [I32x8::splat(0); 3],
+            still: [Mask8::ALL; 3],
+            there,
+        };
+        let mut moves = Mask8::NONE;
+        for a in 0..3 {
+            let length = given[a].abs();
+            let still = F64x8::splat(super::SLOWEST).above(length);
+            let descends = zero.above(given[a]) & !still;
+            rays.flip[a] = I32x8::pick(descends, I32x8::splat(-1), I32x8::splat(0));
+            rays.still[a] = still;
+            rays.origin[a] = F64x8::pick(still, rays.origin[a], F64x8::pick(descends, -place[a], place[a]));
+            rays.direction[a] = F64x8::pick(still, zero, length);
+            rays.inverse[a] = F64x8::pick(still, infinity, F64x8::splat(1.0) / length);
+            rays.there = rays.there & infinity.above(length) & infinity.above(place[a].abs());
+            moves = moves | !still;
+        }
+        rays.there = rays.there & moves;
+        rays
+    }
+
+    #[inline(always)]
+    fn plane(&self, axis: usize, k: I32x8) -> F64x8 {
+        (k.to_f64() - self.origin[axis]) * self.inverse[axis]
+    }
+
+    /// Returns the distance of a plane between cells as they are, not mirrored.
+    #[inline(always)]
+    pub(crate) fn plane_of(&self, axis: usize, k: i32) -> F64x8 {
+        let ascends = I32x8::splat(k);
+        self.plane(axis, I32x8::pick(self.flip[axis].is_negative(), I32x8::splat(-k), ascends))
+    }
+
+    /// Returns one of them.
+    #[inline(always)]
+    pub(crate) fn one(&self, lane: usize) -> GridRay {
+        let of = |v: &[F64x8; 3]| [v[0].0[lane], v[1].0[lane], v[2].0[lane]];
+        GridRay {
+            place: of(&self.place),
+            origin: of(&self.origin),
+            direction: of(&self.direction),
+            inverse: of(&self.inverse),
+            flip: [self.flip[0].0[lane], self.flip[1].0[lane], self.flip[2].0[lane]],
+        }
+    }
+}
+
+/// Where eight walks are to go.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stretch {
+    /// Distance before which nothing is met; not positive where a ray begins at its origin.
+    pub(crate) from: F64x8,
+    /// Distance up to which cells are looked for.
+    pub(crate) to: F64x8,
+}
+
+/// Eight walks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Packet {
+    /// Mirrored cells in which the walks begin: places are counted from them, so that near ones are told best.
+    base: [[i32; LANES]; 3],
+    /// Where the walks begin.
+    origin: [[f32; LANES]; 3],
+    direction: [[f32; LANES]; 3],
+    inverse: [[f32; LANES]; 3],
+    /// By how much rounding may change the distance of a plane of each axis.
+    fuzz: [[f32; LANES]; 3],
+    /// By how much it may change a place.
+    slack: [f32; LANES],
+    flip: [[i32; LANES]; 3],
+    /// First mirrored cell beyond the grid.
+    end: [[i32; LANES]; 3],
+    cell: [[i32; LANES]; 3],
+    /// The axis along which each cell was entered, 3 where the walk began in it.
+    entered: [i32; LANES],
+    /// How far the walks go.
+    to: [f32; LANES],
+    /// Distances at which they begin.
+    begun: F64x8,
+    /// Those that go.
+    active: Mask8,
+    /// Those that must be walked in double precision.
+    pub(crate) refused: Mask8,
+    size: [i32; 3],
+    pub(crate) steps: u32,
+}
+
+/// How eight cells were entered.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Faces {
+    /// Distances.
+    pub(crate) t: F64x8,
+    pub(crate) cell: [I32x8; 3],
+    /// See [`Walk::cell_before`].
+    pub(crate) before: [I32x8; 3],
+    /// See [`Walk::face`].
+    pub(crate) face: I32x8,
+    /// The axis, 3 where the walk began in the cell.
+    pub(crate) entered: I32x8,
+    /// See [`Walk::rank`].
+    pub(crate) rank: I32x8,
+    /// See [`Walk::point`].
+    pub(crate) point: DVec3x8,
+}
+
+/// Where the walks came to, a bit for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Hits {
+    /// Which of them met a marked cell.
+    pub(crate) marked: u32,
+    /// Which passed cells before it that are not marked.
+    pub(crate) passed_empty: u32,
+}
+
+impl Packet {
+    /// Tells whether rays can be walked so.
+    pub(crate) fn can(size: [i32; 3]) -> bool {
+        size.iter().all(|&edge| edge <= LONGEST)
+    }
+
+    /// Begins at stretches of rays, or later where they enter the grid; see [`Walk::begin`].
+    #[inline(always)]
+    pub(crate) fn begin(rays: &GridRays, size: [i32; 3], stretch: &Stretch) -> Self {
+        let zero = F64x8::ZERO;
+        let late = stretch.from.above(zero);
+        let mut start = F64x8::pick(late, stretch.from, zero);
+        if let Some(cell) = rays.cells_within(size, start) {
+            return Self::at(rays, size, cell, I32x8::splat(3), start, stretch.to, rays.there);
+        }
+        let mut axis = I32x8::pick(late, I32x8::splat(0), I32x8::splat(3));
+        let (mut entered, mut active) = (I32x8::splat(3), rays.there);
+        let low = |a: usize| rays.flip[a] & I32x8::splat(-size[a]);
+        for (a, &edge) in size.iter().enumerate() {
+            let this = I32x8::splat(a as i32);
+            let t = rays.plane(a, low(a));
+            let passed = start.above(t) | (t.equal(start) & this.below(axis));
+            let enters = !(passed | rays.still[a]);
+            start = F64x8::pick(enters, t, start);
+            axis = I32x8::pick(enters, this, axis);
+            entered = I32x8::pick(enters, this, entered);
+            let (place, last) = (rays.place[a], F64x8::splat(f64::from(edge)));
+            active = active & (!rays.still[a] | (place.at_least(zero) & last.at_least(place)));
+        }
+        active = active & F64x8::splat(f64::INFINITY).above(start);
+        let mut cell = [I32x8::splat(0); 3];
+        for a in 0..3 {
+            let this = I32x8::splat(a as i32);
+            let last = low(a) + I32x8::splat(size[a] - 1);
+            let t = rays.plane(a, last + I32x8::splat(1));
+            let left = start.above(t) | (t.equal(start) & this.below(axis));
+            active = active & (rays.still[a] | !left);
+            let moving = rays.cell_at(a, low(a), last, start, axis, active);
+            let moving = I32x8::pick(entered.equal(this), low(a), moving);
+            // The last cell holds both of its faces, so that a ray in the border of the grid is in it.
+            let still = rays.place[a].nearest_below().min(I32x8::splat(size[a] - 1));
+            cell[a] = I32x8::pick(rays.still[a], still, moving);
+        }
+        Self::at(rays, size, cell, entered, start, stretch.to, active)
+    }
+
+    /// Begins in known cells at the origins of rays; see [`Walk::begin_in`].
+    #[inline(always)]
+    pub(crate) fn begin_in(rays: &GridRays, size: [i32; 3], cell: [I32x8; 3], to: F64x8) -> Self {
+        let mut active = rays.there;
+        let mut mirrored = cell;
+        for a in 0..3 {
+            active = active & !cell[a].is_negative() & cell[a].below(I32x8::splat(size[a]));
+            mirrored[a] = cell[a] ^ rays.flip[a];
+        }
+        Self::at(rays, size, mirrored, I32x8::splat(3), F64x8::ZERO, to, active)
+    }
+
+    #[inline(always)]
+    fn at(
+        rays: &GridRays,
+        size: [i32; 3],
+        cell: [I32x8; 3],
+        entered: I32x8,
+        begun: F64x8,
+        to: F64x8,
+        mut active: Mask8,
+    ) -> Self {
+        // Distances are counted in steps along the axis of the longest part: no number is then too large or small.
+        let [x, y, z] = rays.direction;
+        let longest = x.max(y).max(z);
+        let unit = F64x8::splat(1.0) / longest;
+        let edge = f64::from(size[0].max(size[1]).max(size[2])) + 1.0;
+        let mut far = F64x8::ZERO;
+        let mut packet = Self {
+            base: [[0; LANES]; 3],
+            origin: [[0.0; LANES]; 3],
+            direction: [[0.0; LANES]; 3],
+            inverse: [[0.0; LANES]; 3],
+            fuzz: [[0.0; LANES]; 3],
+            slack: [0.0; LANES],
+            flip: [rays.flip[0].0, rays.flip[1].0, rays.flip[2].0],
+            end: [[0; LANES]; 3],
+            cell: [[0; LANES]; 3],
+            entered: entered.0,
+            to: [0.0; LANES],
+            begun,
+            active,
+            refused: Mask8::NONE,
+            size,
+            steps: 0,
+        };
+        for a in 0..3 {
+            far = far.max(rays.origin[a].abs());
+        }
+        // What double precision lost on the way counts, too; from very far away it is too much.
+        let doubt = F64x8::splat(DOUBT * edge) + far * F64x8::splat(1e-15);
+        packet.refused = active & !F64x8::splat(FARTHEST).above(far);
+        active = active & !packet.refused;
+        for a in 0..3 {
+            let ends = I32x8::pick(rays.flip[a].is_negative(), I32x8::splat(0), I32x8::splat(size[a]));
+            packet.end[a] = ends.0;
+            let origin = rays.origin[a] + rays.direction[a] * begun;
+            // Within the cell, so that no number is larger than the grid.
+            let origin = (origin - cell[a].to_f64()).max(F64x8::ZERO).min(F64x8::splat(1.0));
+            let direction = rays.direction[a] * unit;
+            packet.direction[a] = direction.round().0;
+            let still = F64x8::splat(1e-30).above(direction);
+            let inverse = F64x8::pick(still, F64x8::splat(f64::INFINITY), rays.inverse[a] * longest);
+            packet.inverse[a] = inverse.round().0;
+            packet.fuzz[a] = (inverse * doubt).round().0;
+            // All planes of what stands still lie at infinity.
+            packet.origin[a] = F64x8::pick(still, F64x8::splat(-1.0), origin).round().0;
+            // Those that go nowhere are looked up, too: in the first cell.
+            packet.cell[a] = I32x8::pick(active, cell[a], rays.flip[a]).0;
+            packet.base[a] = packet.cell[a];
+        }
+        packet.slack = doubt.round().0;
+        let to = (to - begun) * longest;
+        packet.to = (to + doubt + doubt + to.abs() * F64x8::splat(1e-6)).round().0;
+        packet.active = active;
+        packet
+    }
+
+    /// Goes on to the first marked cells, those at hand included.
+    #[inline(always)]
+    pub(crate) fn find_marked(&mut self, rays: &GridRays, layer: &Layer, order: Order) -> Hits {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for processor features can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe {
+                match order {
+                    Order::Exact => wide::find::<true>(self, rays, layer),
+                    Order::Rounded => wide::find::<false>(self, rays, layer),
+                }
+            };
+        }
+        self.find_marked_plainly(rays, layer, order)
+    }
+
+    /// Does the same in plain numbers.
+    pub(crate) fn find_marked_plainly(&mut self, rays: &GridRays, layer: &Layer, order: Order) -> Hits {
+        match order {
+            Order::Exact => plain::find::<true>(self, rays, layer),
+            Order::Rounded => plain::find::<false>(self, rays, layer),
+        }
+    }
+
+    /// Returns how the cells at hand were entered, in double precision.
+    #[inline(always)]
+    pub(crate) fn faces(&self, rays: &GridRays) -> Faces {
+        let mirrored = [I32x8(self.cell[0]), I32x8(self.cell[1]), I32x8(self.cell[2])];
+        let entered = I32x8(self.entered);
+        let (one, zero) = (I32x8::splat(1), I32x8::splat(0));
+        let by = [0, 1, 2].map(|a| entered.equal(I32x8::splat(a)));
+        let planes = [rays.plane(0, mirrored[0]), rays.plane(1, mirrored[1]), rays.plane(2, mirrored[2])];
+        let t = F64x8::pick(by[1], planes[1], F64x8::pick(by[2], planes[2], self.begun));
+        let t = F64x8::pick(by[0], planes[0], t).max(F64x8::ZERO);
+        let [x, y, z] = rays.direction;
+        let longest = I32x8::pick(y.at_least(z), one, I32x8::splat(2));
+        let longest = I32x8::pick(x.at_least(y) & x.at_least(z), zero, longest);
+        let axis = I32x8::pick(entered.equal(I32x8::splat(3)), longest, entered);
+        let mut faces = Faces {
+            t,
+            cell: mirrored,
+            before: mirrored,
+            face: zero,
+            entered,
+            rank: zero,
+            point: DVec3x8 { x: F64x8::ZERO, y: F64x8::ZERO, z: F64x8::ZERO },
+        };
+        let mut point = [F64x8::ZERO; 3];
+        for a in 0..3 {
+            let flip = rays.flip[a];
+            let descends = flip.is_negative();
+            faces.cell[a] = mirrored[a] ^ flip;
+            faces.before[a] = (mirrored[a] - I32x8::pick(by[a], one, zero)) ^ flip;
+            let is_axis = axis.equal(I32x8::splat(a as i32));
+            let face = I32x8::splat(2 * a as i32) + I32x8::pick(descends, one, zero);
+            faces.face = I32x8::pick(is_axis, face, faces.face);
+            // Planes from the corner at which a ray of this direction enters.
+            let low = I32x8::pick(descends, I32x8::splat(self.size[a]), zero);
+            faces.rank = faces.rank + mirrored[a] + low;
+            let step = rays.direction[a] * t;
+            let along = F64x8::pick(descends, rays.place[a] - step, rays.place[a] + step);
+            let from = faces.cell[a].to_f64();
+            let upper = F64x8::pick(descends, from + F64x8::splat(1.0), from);
+            let within = along.max(from).min(from + F64x8::splat(1.0));
+            point[a] = F64x8::pick(by[a], upper, within);
+        }
+        let [x, y, z] = point;
+        faces.point = DVec3x8 { x, y, z };
+        faces
+    }
+}
+
+/// Leaves an empty block in double precision; returns the cell behind it and the axis of its face. Lanes that are in
+/// doubt are few: each is taken by itself.
+#[cold]
+#[inline(never)]
+fn leave(rays: &GridRays, lanes: u32, cell: &[[i32; 8]; 3], mask: &[i32; 8], next: &mut [[i32; 8]; 4]) {
+    for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+        let cell = [cell[0][lane], cell[1][lane], cell[2][lane]];
+        let size = [i32::MAX; 3];
+        let mut walk = Walk { ray: rays.one(lane), size, cell, t: 0.0, entered: None, steps: 0 };
+        walk.leave(mask[lane].count_ones());
+        let [x, y, z] = walk.cell;
+        let entered = walk.entered.map_or(3, |a| a as i32);
+        for (next, value) in next.iter_mut().zip([x, y, z, entered]) {
+            next[lane] = value;
+        }
+    }
+}
+
+/// The kernel, over operations that are in scope.
+macro_rules! kernel {
+    ($($feature:meta)?) => {
+        use super::{Hits, Layer, LANES, GridRays, Packet};
+        use crate::occupancy::Occupancy;
+
+        /// Returns the bits below a mask: numbers of children in their nodes, and words of the nodes.
+        $(#[$feature])?
+        #[inline]
+        fn child([x, y, z]: [Ints; 3], node: Ints) -> (Ints, Ints) {
+            let three = all(3);
+            let bit = or(or(and(x, three), rise::<2>(and(y, three))), rise::<4>(and(z, all(1))));
+            (or(rise::<1>(node), and(fall::<1>(z), all(1))), bit)
+        }
+
+        /// Tells which bits are set, and which octets around them are empty.
+        $(#[$feature])?
+        #[inline]
+        fn look(words: Ints, bit: Ints) -> (Ints, Ints) {
+            let (one, octet) = (all(1), all(Occupancy::OCTET as i32));
+            let set = equal(and(down(words, bit), one), one);
+            (set, equal(and(down(words, and(bit, all(0b0_1010))), octet), all(0)))
+        }
+
+        $(#[$feature])?
+        pub(super) fn find<const SURE: bool>(packet: &mut Packet, rays: &GridRays, layer: &Layer) -> Hits {
+            let three = |v: &[[f32; 8]; 3]| [floats(&v[0]), floats(&v[1]), floats(&v[2])];
+            let threes = |v: &[[i32; 8]; 3]| [ints(&v[0]), ints(&v[1]), ints(&v[2])];
+            let (origin, direction, inverse) = (three(&packet.origin), three(&packet.direction), three(&packet.inverse));
+            let (fuzz, slack, to) = (three(&packet.fuzz), floats(&packet.slack), floats(&packet.to));
+            let (flip, end, base) = (threes(&packet.flip), threes(&packet.end), threes(&packet.base));
+            let (mut cell, mut entered) = (threes(&packet.cell), ints(&packet.entered));
+            let (one, zero) = (all(1), all(0));
+            let (row, slab) = (all(layer.row as i32), all(layer.slab as i32));
+            let mut active = [0; LANES];
+            for i in 0..LANES {
+                active[i] = packet.active.0[i] as i32;
+            }
+            let mut left = ints(&active);
+            let mut hits = Hits::default();
+            let mut steps = 0;
+            while bits(left) != 0 {
+                // 1. Look the cells up.
+                let [x, y, z] = [xor(cell[0], flip[0]), xor(cell[1], flip[1]), xor(cell[2], flip[2])];
+                let chunk = add(fall::<6>(x), add(multiply(fall::<6>(y), row), multiply(fall::<6>(z), slab)));
+                let (top_word, top_bit) = child([fall::<4>(x), fall::<4>(y), and(fall::<4>(z), all(3))], zero);
+                let node = or(rise::<5>(top_word), top_bit);
+                let (middle_word, middle_bit) = child([fall::<2>(x), fall::<2>(y), fall::<2>(z)], node);
+                let (chunk, middle) = (apart(chunk), apart(middle_word));
+                let mut chunks = [&*layer.chunks[chunk[0] as usize]; LANES];
+                let mut words = [0; LANES];
+                for i in 0..LANES {
+                    chunks[i] = &*layer.chunks[chunk[i] as usize];
+                    words[i] = chunks[i].middle[(middle[i] & 0x7f) as usize] as i32;
+                }
+                // One less than the edge of the empty block: of 4 or 8 cells, then of 16, 32 or 64, or of 1 or 2.
+                let words = ints(&words);
+                let (reaching, wide) = look(words, middle_bit);
+                let mut mask = or(all(3), and(wide, all(4)));
+                let bare = and(equal(words, zero), left);
+                if bits(bare) != 0 {
+                    let (top, mut words, mut others) = (apart(top_word), [0; LANES], [0; LANES]);
+                    for i in 0..LANES {
+                        words[i] = chunks[i].top[(top[i] & 1) as usize] as i32;
+                        others[i] = chunks[i].top[(top[i] & 1 ^ 1) as usize] as i32;
+                    }
+                    let words = ints(&words);
+                    let (in_top, wide) = look(words, top_bit);
+                    let nothing = equal(or(words, ints(&others)), zero);
+                    let large = or(or(all(15), and(wide, all(16))), and(nothing, all(63)));
+                    mask = pick(without(bare, in_top), large, mask);
+                }
+                if bits(and(reaching, left)) != 0 {
+                    let node = or(rise::<5>(middle_word), middle_bit);
+                    let (word, bit) = child([x, y, z], node);
+                    let (word, mut words) = (apart(word), [0; LANES]);
+                    for i in 0..LANES {
+                        words[i] = chunks[i].bottom[(word[i] & 0x1fff) as usize] as i32;
+                    }
+                    let (set, wide) = look(ints(&words), bit);
+                    mask = pick(reaching, and(wide, one), mask);
+                    let marked = and(and(reaching, set), left);
+                    hits.marked |= bits(marked);
+                    left = without(left, marked);
+                    if bits(left) == 0 {
+                        break;
+                    }
+                }
+                hits.passed_empty |= bits(left);
+                steps += bits(left).count_ones();
+                // 2. Find the first of the three far planes of each block.
+                let last = [or(cell[0], mask), or(cell[1], mask), or(cell[2], mask)];
+                let far = [add(last[0], one), add(last[1], one), add(last[2], one)];
+                let [tx, ty, tz] = [
+                    times(minus(whole(subtract(far[0], base[0])), origin[0]), inverse[0]),
+                    times(minus(whole(subtract(far[1], base[1])), origin[1]), inverse[1]),
+                    times(minus(whole(subtract(far[2], base[2])), origin[2]), inverse[2]),
+                ];
+                let by_x = and(at_most(tx, ty), at_most(tx, tz));
+                let by_y = without(at_most(ty, tz), by_x);
+                let by_z = without(all(-1), or(by_x, by_y));
+                let by = [by_x, by_y, by_z];
+                let t = choose(by_x, tx, choose(by_y, ty, tz));
+                let mut axis = choose_axis(by_x, by_y);
+                let goes = and(left, at_most(t, to));
+                // 3. Find the cells behind them.
+                let blur = choose(by_x, fuzz[0], choose(by_y, fuzz[1], fuzz[2]));
+                let mut next = far;
+                let mut unsure = zero;
+                for a in 0..3 {
+                    let place = plus(origin[a], times(direction[a], t));
+                    let near = add(nearest(minus(place, splat(0.5))), base[a]);
+                    let aside = least(most(near, cell[a]), last[a]);
+                    if SURE {
+                        let within = minus(place, whole(subtract(aside, base[a])));
+                        let slack = plus(slack, times(direction[a], blur));
+                        let reached = or(less(slack, within), equal(aside, cell[a]));
+                        let kept = less(within, minus(splat(1.0), slack));
+                        unsure = or(unsure, without(goes, or(by[a], and(reached, kept))));
+                    }
+                    next[a] = pick(by[a], far[a], aside);
+                }
+                if SURE {
+                    let lanes = bits(unsure);
+                    if lanes != 0 {
+                        let mut found = [apart(next[0]), apart(next[1]), apart(next[2]), apart(axis)];
+                        let cells = [apart(cell[0]), apart(cell[1]), apart(cell[2])];
+                        super::leave(rays, lanes, &cells, &apart(mask), &mut found);
+                        for a in 0..3 {
+                            next[a] = ints(&found[a]);
+                        }
+                        axis = ints(&found[3]);
+                    }
+                }
+                // 4. Go there, unless the grid or the ray ends.
+                let within = and(below(next[0], end[0]), and(below(next[1], end[1]), below(next[2], end[2])));
+                left = and(goes, within);
+                for a in 0..3 {
+                    cell[a] = pick(left, next[a], cell[a]);
+                }
+                entered = pick(left, axis, entered);
+            }
+            packet.cell = [apart(cell[0]), apart(cell[1]), apart(cell[2])];
+            packet.entered = apart(entered);
+            packet.steps += steps;
+            hits
+        }
+
+        $(#[$feature])?
+        #[inline]
+        fn choose_axis(by_x: Ints, by_y: Ints) -> Ints {
+            pick(by_x, all(0), pick(by_y, all(1), all(2)))
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+mod wide {
+    use super::lanes::wide::*;
+    kernel!(target_feature(enable = "avx2"));
+}
+
+mod plain {
+    use super::lanes::plain::*;
+    kernel!();
+}
+
+impl GridRays {
+    /// Returns the cells along an axis, between two, after all planes before a moment were crossed; see
+    /// [`GridRay::cell_at`].
+    #[inline(always)]
+    fn cell_at(&self, a: usize, from: I32x8, to: I32x8, t: F64x8, axis: I32x8, active: Mask8) -> I32x8 {
+        let step = self.direction[a] * t;
+        let place = self.origin[a] + step;
+        let mut cell = (place - F64x8::splat(0.5)).nearest().max(from).min(to);
+        let (within, one) = (place - cell.to_f64(), F64x8::splat(1.0));
+        let slack = (self.origin[a].abs() + step + one) * F64x8::splat(super::ROUNDING);
+        let reached = within.above(slack) | cell.equal(from);
+        let inside = (one - slack).above(within) | cell.equal(to);
+        let unsure = active & !(reached & inside);
+        if unsure.any() {
+            self.correct(a, &mut cell, [from, to], (t, axis), unsure);
+        }
+        cell
+    }
+
+    /// Returns the cells at some distances, if all of them are beyond doubt and within the grid.
+    #[inline(always)]
+    fn cells_within(&self, size: [i32; 3], t: F64x8) -> Option<[I32x8; 3]> {
+        let mut cells = [I32x8::splat(0); 3];
+        let (mut sure, one) = (Mask8::ALL, F64x8::splat(1.0));
+        for (a, &edge) in size.iter().enumerate() {
+            let step = self.direction[a] * t;
+            let place = self.origin[a] + step;
+            let cell = (place - F64x8::splat(0.5)).nearest();
+            let within = place - cell.to_f64();
+            let slack = (self.origin[a].abs() + step + one) * F64x8::splat(super::ROUNDING);
+            let given = cell ^ self.flip[a];
+            let inside = !given.is_negative() & given.below(I32x8::splat(edge));
+            sure = sure & within.above(slack) & (one - slack).above(within) & inside & !self.still[a];
+            cells[a] = cell;
+        }
+        (!(self.there & !sure).any()).then_some(cells)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn correct(
+        &self,
+        a: usize,
+        cell: &mut I32x8,
+        [from, to]: [I32x8; 2],
+        moment: (F64x8, I32x8),
+        unsure: Mask8,
+    ) {
+        for i in (0..LANES).filter(|&i| unsure.has(i)) {
+            let moment = super::Moment { t: moment.0.0[i], axis: moment.1.0[i] as usize };
+            cell.0[i] = self.one(i).correct(a, cell.0[i], from.0[i], to.0[i], moment);
+        }
+    }
+}
