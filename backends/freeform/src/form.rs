@@ -55,7 +55,7 @@ struct Alive {
 }
 
 /// Bounds of all rays of a tile.
-struct Pyramid {
+pub(crate) struct Pyramid {
     origins: Aabb,
     directions: Aabb,
 }
@@ -117,7 +117,8 @@ impl FormBody {
         scratch: &mut FormScratch,
     ) {
         self.enter(object_from_world, rays, hits, &mut scratch.alive);
-        let Some((pyramid, near, far)) = bound(&scratch.alive) else { return };
+        let bounded = scratch.alive.iter().map(|a| (a.open, a.origin, a.direction, a.near, a.far));
+        let Some((pyramid, near, far)) = Pyramid::around(bounded) else { return };
         scratch.leaves.resize(self.program.leaves.len(), RayQuadric::ZERO);
         let mut waiting = [(0.0, 0.0, 0); LEVELS + 1];
         waiting[0] = (near, far, 0);
@@ -241,7 +242,7 @@ impl FormBody {
 
 /// Returns where rays enter and leave a box, as [`Aabb::clip`]; rays in a face plane are inside.
 #[inline(always)]
-fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) {
+pub(crate) fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) {
     let infinity = F64x8::splat(f64::INFINITY);
     let (mut near, mut far) = (F64x8::ZERO, infinity);
     let axes = [
@@ -261,31 +262,41 @@ fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) 
     (near, far)
 }
 
-/// Bounds all open rays, with the range of their distances; nothing if there are none.
-#[inline(always)]
-fn bound(alive: &[Alive]) -> Option<(Pyramid, f64, f64)> {
-    let (top, bottom) = (F64x8::splat(f64::INFINITY), F64x8::splat(f64::NEG_INFINITY));
-    let (mut low, mut high) = ([top; 7], [bottom; 7]);
-    for a in alive {
-        let numbers = [a.origin.x, a.origin.y, a.origin.z, a.direction.x, a.direction.y, a.direction.z];
-        for (i, v) in numbers.into_iter().enumerate() {
-            low[i] = low[i].min(F64x8::pick(a.open, v, top));
-            high[i] = high[i].max(F64x8::pick(a.open, v, bottom));
-        }
-        low[6] = low[6].min(F64x8::pick(a.open, a.near, top));
-        high[6] = high[6].max(F64x8::pick(a.open, a.far, bottom));
-    }
-    let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
-    let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));
-    let boxed = |i: usize| {
-        Aabb::new(DVec3::new(low[i], low[i + 1], low[i + 2]), DVec3::new(high[i], high[i + 1], high[i + 2]))
-    };
-    (low[6] < high[6]).then(|| (Pyramid { origins: boxed(0), directions: boxed(3) }, low[6], high[6]))
-}
-
 impl Pyramid {
+    /// Bounds rays of which some are open, with the range of their distances; nothing if there are none.
+    #[inline(always)]
+    pub(crate) fn around(
+        rays: impl Iterator<Item = (Mask8, DVec3x8, DVec3x8, F64x8, F64x8)>,
+    ) -> Option<(Self, f64, f64)> {
+        let (top, bottom) = (F64x8::splat(f64::INFINITY), F64x8::splat(f64::NEG_INFINITY));
+        let (mut low, mut high) = ([top; 7], [bottom; 7]);
+        for (open, o, d, near, far) in rays {
+            let numbers = [o.x, o.y, o.z, d.x, d.y, d.z];
+            for i in 0..6 {
+                low[i] = low[i].min(F64x8::pick(open, numbers[i], top));
+                high[i] = high[i].max(F64x8::pick(open, numbers[i], bottom));
+            }
+            low[6] = low[6].min(F64x8::pick(open, near, top));
+            high[6] = high[6].max(F64x8::pick(open, far, bottom));
+        }
+        let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
+        let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));
+        let boxed = |i: usize| {
+            let [from, to] = [&low, &high].map(|v| DVec3::new(v[i], v[i + 1], v[i + 2]));
+            Aabb::new(from, to)
+        };
+        (low[6] <= high[6]).then(|| (Self { origins: boxed(0), directions: boxed(3) }, low[6], high[6]))
+    }
+
+    /// Returns how wide all rays together are at a distance.
+    #[inline(always)]
+    pub(crate) fn width(&self, t: f64) -> f64 {
+        (self.origins.size() + self.directions.size() * t).max_element()
+    }
+
     /// Bounds the places of all rays between two distances.
-    fn between(&self, a: f64, b: f64) -> Aabb {
+    #[inline(always)]
+    pub(crate) fn between(&self, a: f64, b: f64) -> Aabb {
         let (d, o) = (&self.directions, &self.origins);
         let (low, high) = ((d.min * a).min(d.min * b), (d.max * a).max(d.max * b));
         Aabb::new(o.min + low, o.max + high)
@@ -293,8 +304,7 @@ impl Pyramid {
 
     /// Tells whether the rays between two distances are much longer than all of them together are wide.
     fn is_slender(&self, a: f64, b: f64) -> bool {
-        let wide = (self.origins.size() + self.directions.size() * b).max_element();
-        self.directions.center().length() * (b - a) > SLENDER * wide
+        self.directions.center().length() * (b - a) > SLENDER * self.width(b)
     }
 }
 

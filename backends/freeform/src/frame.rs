@@ -1,10 +1,9 @@
 //! A picture, tile by tile: what is met first, then what is seen through, then the light on it.
 
 use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, TILE};
-use crate::form::FormScratch;
 use crate::light::{Illumination, Lit};
 use crate::volume::{Gathered, March, OPAQUE, Shine};
-use crate::world::{Body, Geometry, World};
+use crate::world::{Body, CastScratch, Geometry, World};
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::View;
 use polyptych_core::framebuffer::{Band, Channel, Channels};
@@ -34,7 +33,7 @@ pub(crate) struct Scratch {
     /// Bodies that the rays of the tile may meet.
     bodies: Vec<u32>,
     light: crate::light::Scratch,
-    form: FormScratch,
+    form: CastScratch,
     shines: Vec<Shine>,
     pub(crate) traced: u64,
 }
@@ -93,12 +92,25 @@ impl FrameDrawing<'_> {
         lit: &mut [Lit<'a>; OCTETS],
         scratch: &mut Scratch,
     ) {
-        self.aim(band, first, scratch);
-        let cone = Cone::around(&scratch.rays);
+        // Where straight lines stay straight the corners bound all rays, which need not be known.
+        let straight = self.view.row(band.first_row).is_some();
+        let cone = if straight {
+            Cone::around(&[self.corners(band, first)])
+        } else {
+            self.aim(band, first, scratch);
+            Cone::around(&scratch.rays)
+        };
         let touched = |body: &Body| cone.is_none_or(|c| c.touches(body.center, body.radius));
         let bodies = self.world.bodies.iter().enumerate().filter(|(_, b)| touched(b)).map(|(i, _)| i as u32);
         scratch.bodies.clear();
         scratch.bodies.extend(bodies);
+        if straight {
+            if scratch.bodies.is_empty() {
+                self.leave_empty(band, first, scratch);
+                return;
+            }
+            self.aim(band, first, scratch);
+        }
         scratch.opaque.clear();
         scratch.opaque.extend(scratch.rays.iter().map(Hits::nothing));
         let has = |wanted: fn(&Body) -> bool| {
@@ -120,13 +132,63 @@ impl FrameDrawing<'_> {
             scratch.gathered.resize(OCTETS, [Gathered::NOTHING; LANES]);
             self.look_through(layered, volumes, lit, scratch);
         }
-        self.finish(through, lit, scratch);
+        self.finish((first, band.first_row), through, lit, scratch);
         for (octet, pixels) in scratch.pixels.iter().enumerate() {
             let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
             if row < band.rows && column < band.width {
                 pixels.put(band, column, row);
             }
         }
+    }
+
+    /// Returns the rays through the corners of a tile of a view that keeps straight lines straight.
+    #[inline(always)]
+    fn corners(&self, band: &Band<'_>, first: u32) -> Rays {
+        let mut x = F64x8::splat(f64::from(first));
+        (0..LANES).step_by(2).for_each(|i| x.0[i] = f64::from(band.width.min(first + TILE)));
+        let row = f64::from(band.first_row);
+        let (mut origin, mut direction, _) = self.view.rays(x, row);
+        let lower = self.view.rays(x, row + f64::from(band.rows));
+        for i in 0..2 {
+            origin.set(i, lower.0.get(i));
+            direction.set(i, lower.1.get(i));
+        }
+        Rays { origin, direction, near: F64x8::ZERO, far: F64x8::splat(f64::INFINITY) }
+    }
+
+    /// Fills a tile in which nothing is met.
+    #[inline(always)]
+    fn leave_empty(&self, band: &mut Band<'_>, first: u32, scratch: &mut Scratch) {
+        let columns = TILE.min(band.width - first);
+        scratch.traced += u64::from(columns * band.rows);
+        for row in 0..band.rows {
+            for column in (first..first + columns).step_by(LANES) {
+                Pixels::NOTHING.put(band, column, row);
+            }
+            let begin = (row * band.width + first) as usize;
+            if let (Some(colors), Some(directions)) = (
+                band.color.get_mut(begin..begin + columns as usize),
+                self.view.row(band.first_row + row),
+            ) {
+                directions.fill(&self.world.scene.environment.background, first, colors);
+            }
+        }
+    }
+
+    /// Returns what is seen of the background behind eight pixels.
+    #[inline(always)]
+    fn background(&self, column: u32, row: u32, rays: &Rays) -> Vec3x8 {
+        let background = &self.world.scene.environment.background;
+        let Some(directions) = self.view.row(row) else {
+            return background.gradient().colors(rays.direction.y.round()).finite();
+        };
+        let mut colors = [Vec3::ZERO; LANES];
+        directions.fill(background, column, &mut colors);
+        let mut all = Pixels::BLACK;
+        for i in 0..LANES {
+            all.set(i, colors[i]);
+        }
+        all
     }
 
     /// Sets up the rays through the middles of the pixels.
@@ -154,7 +216,7 @@ impl FrameDrawing<'_> {
         bodies: &[u32],
         rays: &[Rays],
         hits: &mut [Hits],
-        form: &mut FormScratch,
+        form: &mut CastScratch,
     ) {
         for &index in bodies {
             let body = &self.world.bodies[index as usize];
@@ -304,16 +366,29 @@ impl FrameDrawing<'_> {
 
     /// Lights the opaque surfaces, lays what was gathered over them, and fills the pixels.
     #[inline(always)]
-    fn finish<'a>(&'a self, through: bool, lit: &mut [Lit<'a>; OCTETS], scratch: &mut Scratch) {
+    fn finish<'a>(
+        &'a self,
+        (first, first_row): (u32, u32),
+        through: bool,
+        lit: &mut [Lit<'a>; OCTETS],
+        scratch: &mut Scratch,
+    ) {
         let Scratch { rays, opaque, light, form, traced, .. } = &mut *scratch;
-        let background = self.world.scene.environment.background.gradient();
-        if opaque.iter().any(|hits| hits.any().any()) {
+        let [reads_surfaces, reads_color] = [
+            [Channel::Color, Channel::Shadow, Channel::Normal, Channel::Albedo].as_slice(),
+            &[Channel::Color],
+        ]
+        .map(|wanted| wanted.iter().any(|&c| self.channels.has(c)));
+        if reads_surfaces && opaque.iter().any(|hits| hits.any().any()) {
             self.illumination().light(rays, opaque, lit, (light, form), traced);
         }
         for octet in 0..OCTETS {
             let (hits, met) = (&scratch.opaque[octet], scratch.opaque[octet].any());
             let pixels = &mut scratch.pixels[octet];
-            pixels.color = background.colors(scratch.rays[octet].direction.y.round()).finite();
+            if reads_color {
+                let (row, column) = ((octet / COLUMNS) as u32, (octet % COLUMNS * LANES) as u32);
+                pixels.color = self.background(first + column, first_row + row, &scratch.rays[octet]);
+            }
             if met.any() {
                 let lit = &lit[octet];
                 self.first_surface(pixels, lit, hits, met);

@@ -3,7 +3,7 @@
 use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::field;
 use crate::form::{FormBody, FormScratch};
-use crate::heights::HeightBody;
+use crate::heights::{HeightBody, HeightScratch};
 use crate::volume::VolumeBody;
 use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::convert::DistanceModel;
@@ -35,6 +35,13 @@ pub(crate) struct Body {
     pub(crate) radius: f64,
     /// Whether light passes: drawn in layers, casts no shadow.
     pub(crate) see_through: bool,
+}
+
+/// Scratch memory of one worker for casting rays.
+#[derive(Default)]
+pub(crate) struct CastScratch {
+    form: FormScratch,
+    heights: HeightScratch,
 }
 
 /// What is cast.
@@ -153,16 +160,20 @@ impl Body {
         crossing: Crossing,
         rays: &[Rays],
         hits: &mut [Hits],
-        scratch: &mut FormScratch,
+        scratch: &mut CastScratch,
     ) {
-        let bounds = match &*self.geometry {
-            Geometry::Volume(_) => return,
-            Geometry::Form(form) => {
-                form.cast(&self.object_from_world, index, crossing, rays, hits, scratch);
+        let bounds = match (&*self.geometry, &*self.shape) {
+            (Geometry::Volume(_), _) => return,
+            (Geometry::Form(form), _) => {
+                form.cast(&self.object_from_world, index, crossing, rays, hits, &mut scratch.form);
                 return;
             }
-            Geometry::Field(model) => field::bounds(model),
-            Geometry::Plane { .. } | Geometry::Heights(_) => self.shape.bounds(),
+            (Geometry::Heights(body), Shape::HeightField(heights)) => {
+                body.cast(heights, &self.object_from_world, index, rays, hits, &mut scratch.heights);
+                return;
+            }
+            (Geometry::Field(model), _) => field::bounds(model),
+            (Geometry::Plane { .. } | Geometry::Heights(_), _) => self.shape.bounds(),
         };
         for (rays, hits) in rays.iter().zip(hits) {
             let open = rays.open();
@@ -174,11 +185,8 @@ impl Body {
                 if near > far {
                     continue;
                 }
-                let t = match (&*self.geometry, &*self.shape) {
-                    (Geometry::Heights(body), Shape::HeightField(heights)) => {
-                        body.cast(heights, origin, direction, near, far)
-                    }
-                    (Geometry::Field(model), _) => field::cast(model, origin, direction, near, far),
+                let t = match &*self.geometry {
+                    Geometry::Field(model) => field::cast(model, origin, direction, near, far),
                     // The bounds of a plane are the plane.
                     _ => (direction.y != 0.0 && near > 0.0).then_some(near),
                 };
