@@ -2,23 +2,15 @@
 
 use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, TILE};
 use crate::light::{Illumination, Lit};
-use crate::volume::{Gathered, March, OPAQUE, Shine};
+use crate::volume::{Gathered, March, OPAQUE};
 use crate::world::{Body, CastScratch, Geometry, World};
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::View;
 use polyptych_core::framebuffer::{Band, Channel, Channels};
 use polyptych_core::lanes::{F32x8, F64x8, LANES, Mask8, Vec3x8};
-use polyptych_core::math::Aabb;
 use polyptych_core::scene::Shape;
 use polyptych_core::seam::Control;
 use polyptych_core::shade::{facing, fogged};
-
-/// How to draw.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Options {
-    /// Step through volumes in units of the smallest spacing.
-    pub(crate) volume_step: f64,
-}
 
 /// Scratch memory for one band.
 #[derive(Default)]
@@ -34,8 +26,32 @@ pub(crate) struct Scratch {
     bodies: Vec<u32>,
     light: crate::light::Scratch,
     form: CastScratch,
-    shines: Vec<Shine>,
+    /// Parts of one ray in volumes.
+    stretches: Vec<Stretch>,
     pub(crate) traced: u64,
+}
+
+/// The part of a ray in one volume.
+struct Stretch {
+    body: u32,
+    /// The ray in object space.
+    origin: DVec3,
+    direction: DVec3,
+    /// Where it enters the volume; samples are counted from there.
+    enter: f64,
+    step: f64,
+    /// Those that are left.
+    samples: std::ops::Range<u32>,
+}
+
+impl Stretch {
+    fn begin(&self) -> f64 {
+        self.enter + f64::from(self.samples.start) * self.step
+    }
+
+    fn end(&self) -> f64 {
+        self.enter + f64::from(self.samples.end) * self.step
+    }
 }
 
 /// What one frame is drawn with.
@@ -43,7 +59,6 @@ pub(crate) struct FrameDrawing<'a> {
     pub(crate) world: &'a World,
     pub(crate) view: View<'a>,
     pub(crate) channels: Channels,
-    pub(crate) options: Options,
 }
 
 impl FrameDrawing<'_> {
@@ -307,61 +322,81 @@ impl FrameDrawing<'_> {
     fn march(&self, octet: usize, lane: usize, end: f64, scratch: &mut Scratch) {
         let rays = &scratch.through[octet];
         let (eye, toward, near) = (rays.origin.get(lane), rays.direction.get(lane), rays.near.0[lane]);
+        scratch.stretches.clear();
         for &index in &scratch.bodies {
             let body = &self.world.bodies[index as usize];
-            let (Geometry::Volume(volume), Shape::Volume(shape)) = (&*body.geometry, &*body.shape) else {
-                continue;
-            };
+            let Geometry::Volume(volume) = &*body.geometry else { continue };
             let origin = body.object_from_world.transform_point3(eye);
             let direction = body.object_from_world.transform_vector3(toward);
-            let bounds: Aabb =
-                shape.shell.as_ref().map_or(shape.bounds(), |s| s.bounds().intersection(shape.bounds()));
-            let Some((enter, leave)) = bounds.clip(origin, direction) else { continue };
-            let object_per_world = direction.length();
-            let step = self.options.volume_step * shape.spacing().min_element() / object_per_world;
+            let Some((enter, leave)) = body.local_bounds.clip(origin, direction) else { continue };
+            let step = volume.step / direction.length();
             // Samples keep their places whatever layers cut the ray: each belongs to the part it stands in.
             let count = ((leave.min(end) - enter) / step - 0.5).ceil().clamp(0.0, f64::from(u32::MAX / 4));
-            let first = ((near - enter) / step - 0.5).ceil().clamp(0.0, count);
-            let scene = &self.world.scene;
-            let material = scene.material(&scene.objects[body.object], 0);
-            self.shine_on(body.center, &mut scratch.shines);
-            let march = March {
-                volume: shape,
-                material,
-                environment: &scene.environment,
-                origin,
-                direction,
-                step,
-                object_per_world,
-                normal_map: body.normal_map,
-                to_eye: -toward.as_vec3(),
-            };
-            let sum = &mut scratch.gathered[octet][lane];
-            let was_half = sum.half;
-            volume.march(&march, enter, first as u32..count as u32, &scratch.shines, sum);
-            if let (None, Some(t)) = (was_half, sum.half) {
-                let pixels = &mut scratch.pixels[octet];
-                if pixels.id.0[lane] == 0 {
-                    (pixels.id.0[lane], pixels.distance.0[lane]) = (body.object as u32 + 1, t as f32);
-                    let p = origin + direction * t;
-                    let normal = body.normal_map * -shape.gradient(p);
-                    pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
-                    pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
-                }
+            let first = ((near - enter) / step - 0.5).ceil().clamp(0.0, count) as u32;
+            if first < count as u32 {
+                let samples = first..count as u32;
+                scratch.stretches.push(Stretch { body: index, origin, direction, enter, step, samples });
             }
+        }
+        let stretches = &mut scratch.stretches;
+        stretches.sort_unstable_by(|a, b| a.begin().total_cmp(&b.begin()).then(a.body.cmp(&b.body)));
+        let sum = &mut scratch.gathered[octet][lane];
+        let pixels = &mut scratch.pixels[octet];
+        // Where volumes overlap they take turns, slice by slice, as thick as the longest of their steps.
+        while let Some(first) = stretches.first() {
+            let begin = first.begin();
+            let over = |s: &Stretch| s.begin() < first.end();
+            let together = stretches.iter().take_while(|s| over(s)).count();
+            let slice = stretches[..together].iter().map(|s| s.step).fold(0.0, f64::max);
+            let until = if together == 1 { f64::INFINITY } else { begin + slice };
+            for stretch in &mut stretches[..together] {
+                self.march_stretch(stretch, until, toward, sum, (pixels, lane));
+            }
+            stretches.retain(|s| !s.samples.is_empty() && sum.transparency >= OPAQUE);
+            stretches.sort_unstable_by(|a, b| a.begin().total_cmp(&b.begin()).then(a.body.cmp(&b.body)));
         }
     }
 
-    /// Lists the lights as they arrive at the middle of a volume.
-    fn shine_on(&self, center: DVec3, shines: &mut Vec<Shine>) {
-        shines.clear();
-        shines.extend(
-            self.world
-                .lights
-                .iter()
-                .filter_map(|light| light.arriving(center))
-                .map(|a| Shine { to_light: a.to_light.as_vec3(), radiance: a.radiance }),
-        );
+    /// Adds the samples of a volume up to a distance.
+    fn march_stretch(
+        &self,
+        stretch: &mut Stretch,
+        until: f64,
+        toward: DVec3,
+        sum: &mut Gathered,
+        (pixels, lane): (&mut Pixels, usize),
+    ) {
+        let body = &self.world.bodies[stretch.body as usize];
+        let (Geometry::Volume(volume), Shape::Volume(shape)) = (&*body.geometry, &*body.shape) else {
+            return;
+        };
+        let count = ((until - stretch.enter) / stretch.step - 0.5).ceil();
+        let last = (count.clamp(0.0, f64::from(u32::MAX / 2)) as u32)
+            .clamp(stretch.samples.start, stretch.samples.end);
+        let scene = &self.world.scene;
+        let march = March {
+            volume: shape,
+            material: scene.material(&scene.objects[body.object], 0),
+            environment: &scene.environment,
+            shines: &body.shines,
+            origin: stretch.origin,
+            direction: stretch.direction,
+            step: stretch.step,
+            normal_map: body.normal_map.as_mat3(),
+            to_eye: -toward.as_vec3(),
+        };
+        let was_half = sum.half;
+        volume.march(&march, stretch.enter, stretch.samples.start..last, sum);
+        stretch.samples.start = last;
+        if let (None, Some(t)) = (was_half, sum.half)
+            && pixels.id.0[lane] == 0
+        {
+            (pixels.id.0[lane], pixels.distance.0[lane]) = (body.object as u32 + 1, t as f32);
+            let p = stretch.origin + stretch.direction * t;
+            let normal = body.normal_map * -shape.gradient(p);
+            pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
+            pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
+        }
     }
 
     /// Lights the opaque surfaces, lays what was gathered over them, and fills the pixels.

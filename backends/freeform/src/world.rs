@@ -4,7 +4,7 @@ use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::field;
 use crate::form::{FormBody, FormScratch};
 use crate::heights::{HeightBody, HeightScratch};
-use crate::volume::VolumeBody;
+use crate::volume::{Shine, VolumeBody};
 use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::convert::DistanceModel;
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
@@ -35,6 +35,10 @@ pub(crate) struct Body {
     pub(crate) radius: f64,
     /// Whether light passes: drawn in layers, casts no shadow.
     pub(crate) see_through: bool,
+    /// Bounds in object space: of a volume what its shell leaves of it.
+    pub(crate) local_bounds: Aabb,
+    /// The lights as they arrive at the middle of a volume.
+    pub(crate) shines: Vec<Shine>,
 }
 
 /// Scratch memory of one worker for casting rays.
@@ -84,8 +88,9 @@ impl Points<'_> {
 }
 
 impl Geometry {
-    /// Builds what is cast of a shape that is drawn as given; nothing for meshes and voxels.
-    pub(crate) fn of(shape: &Shape) -> Option<Self> {
+    /// Builds what is cast of a shape that is drawn as given, with steps through volumes in units of their spacing;
+    /// nothing for meshes and voxels.
+    pub(crate) fn of(shape: &Shape, volume_step: f64) -> Option<Self> {
         Some(match shape {
             Shape::Primitive(Primitive::Plane { width, depth }) => {
                 Self::Plane { width: *width, depth: *depth }
@@ -93,7 +98,7 @@ impl Geometry {
             Shape::Primitive(primitive) => Self::Form(FormBody::new(&FreeForm::from_primitive(primitive)?)),
             Shape::FreeForm(form) => Self::Form(FormBody::new(form)),
             Shape::HeightField(heights) => Self::Heights(HeightBody::new(heights)),
-            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume)),
+            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume, volume_step)),
             Shape::Mesh(_) | Shape::Voxels(_) => return None,
         })
     }
@@ -125,11 +130,26 @@ impl Geometry {
 }
 
 impl Body {
-    pub(crate) fn new(scene: &Scene, index: usize, object: &Object, geometry: Arc<Geometry>) -> Self {
+    pub(crate) fn new(
+        scene: &Scene,
+        lights: &[Light],
+        index: usize,
+        object: &Object,
+        geometry: Arc<Geometry>,
+    ) -> Self {
         let world_from_object = object.world_from_object;
-        let local = match &*geometry {
-            Geometry::Field(model) => field::bounds(model),
+        let local = match (&*geometry, &*object.shape) {
+            (Geometry::Field(model), _) => field::bounds(model),
+            (_, Shape::Volume(volume)) => {
+                let own = volume.bounds();
+                volume.shell.as_ref().map_or(own, |s| s.bounds().intersection(own))
+            }
             _ => object.shape.bounds(),
+        };
+        let center = local.transformed(&world_from_object).center();
+        let shines = match &*geometry {
+            Geometry::Volume(_) => lights.iter().filter_map(|l| Shine::arriving(l, center)).collect(),
+            _ => Vec::new(),
         };
         let bounds: Aabb = local.transformed(&world_from_object);
         let see_through = match &*geometry {
@@ -146,6 +166,8 @@ impl Body {
             // The margin of the forms' own bounds.
             radius: bounds.radius() * 1.001,
             see_through,
+            local_bounds: local,
+            shines,
         }
     }
 
@@ -162,7 +184,7 @@ impl Body {
         hits: &mut [Hits],
         scratch: &mut CastScratch,
     ) {
-        let bounds = match (&*self.geometry, &*self.shape) {
+        match (&*self.geometry, &*self.shape) {
             (Geometry::Volume(_), _) => return,
             (Geometry::Form(form), _) => {
                 form.cast(&self.object_from_world, index, crossing, rays, hits, &mut scratch.form);
@@ -172,15 +194,14 @@ impl Body {
                 body.cast(heights, &self.object_from_world, index, rays, hits, &mut scratch.heights);
                 return;
             }
-            (Geometry::Field(model), _) => field::bounds(model),
-            (Geometry::Plane { .. } | Geometry::Heights(_), _) => self.shape.bounds(),
-        };
+            _ => {}
+        }
         for (rays, hits) in rays.iter().zip(hits) {
             let open = rays.open();
             for i in (0..LANES).filter(|&i| open.has(i)) {
                 let origin = self.object_from_world.transform_point3(rays.origin.get(i));
                 let direction = self.object_from_world.transform_vector3(rays.direction.get(i));
-                let Some((near, far)) = bounds.clip(origin, direction) else { continue };
+                let Some((near, far)) = self.local_bounds.clip(origin, direction) else { continue };
                 let (near, far) = (near.max(rays.near.0[i]), far.min(rays.far.0[i]).min(hits.t.0[i]));
                 if near > far {
                     continue;
