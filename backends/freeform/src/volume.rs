@@ -137,8 +137,8 @@ impl Table {
     #[inline(always)]
     fn at(&self, value: f32) -> Vec4 {
         let place = self.place(value);
-        let i = place as usize;
-        let (a, b) = (self.entries[i], self.entries[i + 1]);
+        let i = place as i32;
+        let [a, b] = [self.entries[i as usize], self.entries[i as usize + 1]];
         a + (b - a) * (place - i as f32)
     }
 
@@ -314,13 +314,14 @@ impl VolumeBody {
             let grid = free.max(Vec3::ONE).min(last);
             let sample = i;
             i += 1;
-            let base = [grid.x as usize, grid.y as usize, grid.z as usize];
+            let whole = grid.to_array().map(|g| g as i32);
+            let base = whole.map(|w| w as usize);
             let reach = self.clear_around(base);
             if reach > 0 {
                 i = i.saturating_add(jump(base, reach, free, step, pace));
                 continue;
             }
-            let place = Place::new(self, grid, base);
+            let place = Place::new(self, grid, whole, base);
             let (value, row) = place.value();
             let color = self.table.at(value);
             let alpha = color.w;
@@ -399,17 +400,13 @@ impl VolumeBody {
 /// Returns how many samples more stand in the transparent box around a brick.
 #[inline(always)]
 fn jump(base: [usize; 3], reach: u8, grid: Vec3, step: Vec3, pace: Vec3) -> u32 {
-    let reach = usize::from(reach);
+    let reach = f32::from(reach);
     let mut count = f32::INFINITY;
     for axis in 0..3 {
         if step[axis] != 0.0 {
-            let brick = base[axis] / BRICK;
-            let side = if step[axis] > 0.0 {
-                ((brick + reach) * BRICK) as f32
-            } else {
-                ((brick + 1) * BRICK) as f32 - (reach * BRICK) as f32
-            };
-            count = count.min((side - grid[axis]) * pace[axis]);
+            let brick = (base[axis] / BRICK) as i32 as f32;
+            let side = if step[axis] > 0.0 { brick + reach } else { brick + 1.0 - reach };
+            count = count.min((side * BRICK as f32 - grid[axis]) * pace[axis]);
         }
     }
     // One sample less than the border: rounding never jumps over a brick that is not clear.
@@ -434,11 +431,11 @@ struct Rows {
 
 impl<'a> Place<'a> {
     #[inline(always)]
-    fn new(body: &'a VolumeBody, grid: Vec3, base: [usize; 3]) -> Self {
+    fn new(body: &'a VolumeBody, grid: Vec3, whole: [i32; 3], base: [usize; 3]) -> Self {
         let [x, y, z] = base;
         let (row, plane) = (body.size[0], body.size[0] * body.size[1]);
         let first = (z - 1) * plane + (y - 1) * row + x - 1;
-        let part = grid - Vec3::new(x as f32, y as f32, z as f32);
+        let part = grid - Vec3::from_array(whole.map(|w| w as f32));
         Self { values: &body.values[first..first + 3 * plane + 3 * row + 4], row, plane, part }
     }
 
