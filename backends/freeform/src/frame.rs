@@ -181,10 +181,9 @@ impl FrameDrawing<'_> {
                 Pixels::NOTHING.put(band, column, row);
             }
             let begin = (row * band.width + first) as usize;
-            if let (Some(colors), Some(directions)) = (
-                band.color.get_mut(begin..begin + columns as usize),
-                self.view.row(band.first_row + row),
-            ) {
+            if let (Some(colors), Some(directions)) =
+                (band.color.get_mut(begin..begin + columns as usize), self.view.row(band.first_row + row))
+            {
                 directions.fill(&self.world.scene.environment.background, first, colors);
             }
         }

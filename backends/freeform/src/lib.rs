@@ -23,6 +23,8 @@ mod plan;
 mod program;
 mod renderer;
 mod roots;
+#[cfg(test)]
+mod truth;
 mod volume;
 mod world;
 

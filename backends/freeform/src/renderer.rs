@@ -1,6 +1,7 @@
 //! The seam: what is prepared and kept, and one frame of it.
 
 use crate::bundle::TILE;
+use crate::form::Precision;
 use crate::frame::{FrameDrawing, Scratch};
 use crate::plan::plan;
 use crate::world::{Body, Geometry, World};
@@ -52,6 +53,15 @@ fn info() -> BackendInfo {
                 unit: "samples",
                 help: "step through volumes, in units of the smallest distance of their samples",
                 tag: "volume.step",
+                quality_axis: true,
+            },
+            Parameter {
+                name: "roots.precision",
+                kind: ParameterKind::Choice { choices: &["single", "double"] },
+                default: Value::Text("single".to_owned()),
+                unit: "",
+                help: "numbers in which roots of free forms are searched for; both end with a step in double precision",
+                tag: "precision",
                 quality_axis: true,
             },
             Parameter {
@@ -178,6 +188,10 @@ impl Renderer for Freeform {
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
         let volume_step = need.settings.float(&self.info.parameters, "volume.step");
+        let precision = match need.settings.text(&self.info.parameters, "roots.precision") {
+            "double" => Precision::Double,
+            _ => Precision::Single,
+        };
         if volume_step != self.volume_step {
             // Opacities are kept for samples so far apart.
             self.kept.retain(|_, (_, geometry)| !matches!(**geometry, Geometry::Volume(_)));
@@ -196,7 +210,7 @@ impl Renderer for Freeform {
             };
             decisions.push(match built {
                 Ok((geometry, decision)) => {
-                    bodies.push(Body::new(scene, &lights, index, object, geometry));
+                    bodies.push(Body::new((scene, &lights, precision), index, object, geometry));
                     with_material(scene, object, decision)
                 }
                 Err(reason) if object.required => {

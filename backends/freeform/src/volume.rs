@@ -282,24 +282,12 @@ impl VolumeBody {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn march_avx2(
-        &self,
-        ray: &March<'_>,
-        begin: f64,
-        samples: std::ops::Range<u32>,
-        sum: &mut Gathered,
-    ) {
+    fn march_avx2(&self, ray: &March<'_>, begin: f64, samples: std::ops::Range<u32>, sum: &mut Gathered) {
         self.march_plain(ray, begin, samples, sum);
     }
 
     #[inline(always)]
-    fn march_plain(
-        &self,
-        ray: &March<'_>,
-        begin: f64,
-        samples: std::ops::Range<u32>,
-        sum: &mut Gathered,
-    ) {
+    fn march_plain(&self, ray: &March<'_>, begin: f64, samples: std::ops::Range<u32>, sum: &mut Gathered) {
         let volume = ray.volume;
         let middle = volume.grid_from_object(ray.origin + ray.direction * (begin + 0.5 * ray.step));
         let first = (middle + BORDER as f64).as_vec3();

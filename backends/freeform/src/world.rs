@@ -2,7 +2,7 @@
 
 use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::field;
-use crate::form::{FormBody, FormScratch};
+use crate::form::{Cast, FormBody, FormScratch, Precision};
 use crate::heights::{HeightBody, HeightScratch};
 use crate::volume::{Shine, VolumeBody};
 use glam::{DAffine3, DMat3, DVec3};
@@ -35,6 +35,8 @@ pub(crate) struct Body {
     pub(crate) radius: f64,
     /// Whether light passes: drawn in layers, casts no shadow.
     pub(crate) see_through: bool,
+    /// In which numbers the roots of forms are searched for.
+    pub(crate) precision: Precision,
     /// Bounds in object space: of a volume what its shell leaves of it.
     pub(crate) local_bounds: Aabb,
     /// The lights as they arrive at the middle of a volume.
@@ -131,8 +133,7 @@ impl Geometry {
 
 impl Body {
     pub(crate) fn new(
-        scene: &Scene,
-        lights: &[Light],
+        (scene, lights, precision): (&Scene, &[Light], Precision),
         index: usize,
         object: &Object,
         geometry: Arc<Geometry>,
@@ -166,6 +167,7 @@ impl Body {
             // The margin of the forms' own bounds.
             radius: bounds.radius() * 1.001,
             see_through,
+            precision,
             local_bounds: local,
             shines,
         }
@@ -187,7 +189,13 @@ impl Body {
         match (&*self.geometry, &*self.shape) {
             (Geometry::Volume(_), _) => return,
             (Geometry::Form(form), _) => {
-                form.cast(&self.object_from_world, index, crossing, rays, hits, &mut scratch.form);
+                let cast = Cast {
+                    object_from_world: &self.object_from_world,
+                    body: index,
+                    crossing,
+                    precision: self.precision,
+                };
+                form.cast(cast, rays, hits, &mut scratch.form);
                 return;
             }
             (Geometry::Heights(body), Shape::HeightField(heights)) => {
