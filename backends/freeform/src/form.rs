@@ -422,12 +422,21 @@ impl Pyramid {
         let (mut low, mut high) = ([top; 7], [bottom; 7]);
         for (open, o, d, near, far) in rays {
             let numbers = [o.x, o.y, o.z, d.x, d.y, d.z];
-            for i in 0..6 {
-                low[i] = low[i].min(F64x8::pick(open, numbers[i], top));
-                high[i] = high[i].max(F64x8::pick(open, numbers[i], bottom));
+            if (!open).any() {
+                for i in 0..6 {
+                    low[i] = low[i].min(F64x8::pick(open, numbers[i], top));
+                    high[i] = high[i].max(F64x8::pick(open, numbers[i], bottom));
+                }
+                low[6] = low[6].min(F64x8::pick(open, near, top));
+                high[6] = high[6].max(F64x8::pick(open, far, bottom));
+            } else {
+                for i in 0..6 {
+                    low[i] = low[i].min(numbers[i]);
+                    high[i] = high[i].max(numbers[i]);
+                }
+                low[6] = low[6].min(near);
+                high[6] = high[6].max(far);
             }
-            low[6] = low[6].min(F64x8::pick(open, near, top));
-            high[6] = high[6].max(F64x8::pick(open, far, bottom));
         }
         let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
         let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));

@@ -139,9 +139,18 @@ impl FrameDrawing<'_> {
             &mut scratch.opaque,
             &mut scratch.form,
         );
+        let through = layered || volumes;
+        if !through && !self.reads_surfaces() {
+            for (octet, hits) in scratch.opaque.iter().enumerate() {
+                let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
+                if row < band.rows && column < band.width {
+                    self.put_place(band, column, row, hits);
+                }
+            }
+            return;
+        }
         scratch.pixels.clear();
         scratch.pixels.resize(OCTETS, Pixels::NOTHING);
-        let through = layered || volumes;
         if through {
             scratch.gathered.clear();
             scratch.gathered.resize(OCTETS, [Gathered::NOTHING; LANES]);
@@ -238,6 +247,27 @@ impl FrameDrawing<'_> {
                 body.cast(index, Crossing::Any, rays, hits, form);
             }
         }
+    }
+
+    /// Tells whether more is asked of surfaces than which they are and where.
+    fn reads_surfaces(&self) -> bool {
+        [Channel::Color, Channel::Shadow, Channel::Normal, Channel::Albedo]
+            .iter()
+            .any(|&c| self.channels.has(c))
+    }
+
+    /// Writes what eight rays met, and where.
+    #[inline(always)]
+    fn put_place(&self, band: &mut Band<'_>, column: u32, row: u32, hits: &Hits) {
+        let count = LANES.min((band.width - column) as usize);
+        let first = row as usize * band.width as usize + column as usize;
+        let met = hits.any();
+        let distance = met.pick(hits.t.round(), F32x8::splat(f32::INFINITY));
+        put(band.distance, first, count, |i| distance.0[i]);
+        put(band.coverage, first, count, |i| if met.has(i) { 1.0 } else { 0.0 });
+        put(band.id, first, count, |i| {
+            self.world.bodies.get(hits.body.0[i] as usize).map_or(0, |b| b.object as u32 + 1)
+        });
     }
 
     fn illumination(&self) -> Illumination<'_> {
@@ -408,12 +438,8 @@ impl FrameDrawing<'_> {
         scratch: &mut Scratch,
     ) {
         let Scratch { rays, opaque, light, form, traced, .. } = &mut *scratch;
-        let [reads_surfaces, reads_color] = [
-            [Channel::Color, Channel::Shadow, Channel::Normal, Channel::Albedo].as_slice(),
-            &[Channel::Color],
-        ]
-        .map(|wanted| wanted.iter().any(|&c| self.channels.has(c)));
-        if reads_surfaces && opaque.iter().any(|hits| hits.any().any()) {
+        let reads_color = self.channels.has(Channel::Color);
+        if self.reads_surfaces() && opaque.iter().any(|hits| hits.any().any()) {
             self.illumination().light(rays, opaque, lit, (light, form), traced);
         }
         for octet in 0..OCTETS {
@@ -448,14 +474,15 @@ impl FrameDrawing<'_> {
     /// Fills the geometry channels of pixels that show nothing yet.
     #[inline(always)]
     fn first_surface(&self, pixels: &mut Pixels, lit: &Lit<'_>, hits: &Hits, met: Mask8) {
-        let mut free = met;
+        let (mut free, mut ids) = (met, Mask8::NONE);
         for i in 0..LANES {
-            if pixels.id.0[i] != 0 {
-                free.0[i] = 0;
-            }
-            if free.has(i) {
-                pixels.id.0[i] = self.world.bodies[hits.body.0[i] as usize].object as u32 + 1;
-                if lit.casting.0[i] > 0 {
+            free.0[i] &= if pixels.id.0[i] == 0 { u32::MAX } else { 0 };
+            ids.0[i] = self.world.bodies.get(hits.body.0[i] as usize).map_or(0, |b| b.object as u32 + 1);
+        }
+        pixels.id = free.pick_bits(ids, pixels.id);
+        if self.channels.has(Channel::Shadow) {
+            for i in 0..LANES {
+                if free.has(i) && lit.casting.0[i] > 0 {
                     pixels.shadow.0[i] = 1.0 - lit.dark.0[i] as f32 / lit.casting.0[i] as f32;
                 }
             }
