@@ -1,6 +1,6 @@
 //! A picture, tile by tile: what is met first, then what is seen through, then the light on it.
 
-use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, TILE};
+use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, Sides, TILE};
 use crate::light::{Illumination, Lit};
 use crate::volume::{Gathered, March, OPAQUE};
 use crate::world::{Body, CastScratch, Geometry, World};
@@ -109,13 +109,18 @@ impl FrameDrawing<'_> {
     ) {
         // Where straight lines stay straight the corners bound all rays, which need not be known.
         let straight = self.view.row(band.first_row).is_some();
-        let cone = if straight {
-            Cone::around(&[self.corners(band, first)])
+        let (cone, sides) = if straight {
+            let corners = self.corners(band, first);
+            let around = [1, 0, 2, 3].map(|i| (corners.origin.get(i), corners.direction.get(i)));
+            (Cone::around(&[corners]), Some(Sides::between(around)))
         } else {
             self.aim(band, first, scratch);
-            Cone::around(&scratch.rays)
+            (Cone::around(&scratch.rays), None)
         };
-        let touched = |body: &Body| cone.is_none_or(|c| c.touches(body.center, body.radius));
+        let touched = |body: &Body| {
+            cone.is_none_or(|c| c.touches(body.center, body.radius))
+                && !sides.is_some_and(|s| s.exclude(&body.corners))
+        };
         let bodies = self.world.bodies.iter().enumerate().filter(|(_, b)| touched(b)).map(|(i, _)| i as u32);
         scratch.bodies.clear();
         scratch.bodies.extend(bodies);

@@ -33,6 +33,8 @@ pub(crate) struct Body {
     pub(crate) normal_map: DMat3,
     pub(crate) center: DVec3,
     pub(crate) radius: f64,
+    /// Corners of its bounds in the world.
+    pub(crate) corners: [DVec3; 8],
     /// Whether light passes: drawn in layers, casts no shadow.
     pub(crate) see_through: bool,
     /// In which numbers the roots of forms are searched for.
@@ -166,6 +168,10 @@ impl Body {
             center: bounds.center(),
             // The margin of the forms' own bounds.
             radius: bounds.radius() * 1.001,
+            corners: local
+                .grown(local.radius() * 1e-3)
+                .corners()
+                .map(|c| world_from_object.transform_point3(c)),
             see_through,
             precision,
             local_bounds: local,
