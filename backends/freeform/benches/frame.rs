@@ -1,7 +1,8 @@
 //! How long does a frame of each kind take?
 //!
 //! `cargo bench -p polyptych-freeform` draws on one thread. Where `POLYPTYCH_MODELS` names a folder with
-//! `volume/cranium_ct_i16.nrrd`, the head is that one, else a made-up volume of its size.
+//! `volume/cranium_ct_i16.nrrd`, the head is that one, else a made-up volume of its size. Where
+//! `POLYPTYCH_BENCH_SCENES` names files of scenes, with commas between, those are drawn too, lit and at 1024x1024.
 
 use divan::Bencher;
 use glam::{DVec2, DVec3, Vec3};
@@ -12,10 +13,11 @@ use polyptych_core::load::LoadOptions;
 use polyptych_core::parallel::Pool;
 use polyptych_core::scene::{
     Form, FreeForm, HeightField, Light, Material, Object, Perturbation, Power, Samples, Scene, Shape,
-    TransferFunction, Volume,
+    TransferFunction, TransferPreset, Volume,
 };
 use polyptych_core::seam::{Control, Need, Renderer};
 use polyptych_freeform::Freeform;
+use std::path::Path;
 use std::sync::Arc;
 
 fn main() {
@@ -118,9 +120,24 @@ impl Stage {
         channels: Channels,
         threads: usize,
     ) -> Self {
+        Self::with(scene, camera, [width, height], channels, threads, &[])
+    }
+
+    fn with(
+        scene: Scene,
+        camera: Camera,
+        [width, height]: [u32; 2],
+        channels: Channels,
+        threads: usize,
+        settings: &[(&str, &str)],
+    ) -> Self {
         let mut need = Need::new(camera, width, height);
         need.channels = channels;
         let mut freeform = Freeform::new();
+        for (name, value) in settings {
+            let declared = freeform.info().parameters.clone();
+            need.settings.set("freeform", &declared, name, value).expect("a parameter");
+        }
         let pool = Pool::new(threads).expect("threads");
         freeform
             .prepare(&Arc::new(scene), &need, &Converter::default(), &Control::new(&pool))
@@ -203,14 +220,13 @@ fn heights(bencher: Bencher, edge: u32) {
 /// The head of `POLYPTYCH_MODELS`, or shells of the same size in samples.
 fn head() -> Volume {
     let loaded = std::env::var("POLYPTYCH_MODELS").ok().and_then(|folder| {
-        let path = std::path::Path::new(&folder).join("volume/cranium_ct_i16.nrrd");
-        let scene = polyptych_core::load::load(&path, &LoadOptions::default()).ok()?;
+        let scene = loaded(&Path::new(&folder).join("volume/cranium_ct_i16.nrrd"))?;
         scene.objects.iter().find_map(|o| match &*o.shape {
             Shape::Volume(volume) => Some(volume.clone()),
             _ => None,
         })
     });
-    let mut volume = loaded.unwrap_or_else(|| {
+    loaded.unwrap_or_else(|| {
         let size = [256u32, 256, 108];
         let value = |i: u32| {
             let cell = [i % 256, i / 256 % 256, i / 65536].map(f64::from);
@@ -227,18 +243,39 @@ fn head() -> Volume {
         };
         let samples = Samples::I16((0..256 * 256 * 108).map(value).collect());
         Volume::new(size, DVec3::new(0.9, 0.9, 1.6), samples).expect("a volume")
-    });
-    volume.transfer = TransferFunction::ct(volume.spacing().min_element());
-    volume
+    })
 }
 
-/// A head from tomography, lit.
-#[divan::bench(consts = [1, 2])]
-fn tomography<const THREADS: usize>(bencher: Bencher) {
-    let volume = head();
+/// A head from tomography, lit: bone alone, or skin and muscle too, with steps in units of the spacing.
+#[divan::bench(args = ["bone 0.5", "bone 1.0", "tissue 0.5", "tissue 1.0"], consts = [1, 2])]
+fn tomography<const THREADS: usize>(bencher: Bencher, which: &str) {
+    let mut volume = head();
+    let (preset, step) = which.split_once(' ').expect("two words");
+    let preset = if preset == "bone" { TransferPreset::CtBone } else { TransferPreset::CtTissue };
+    volume.transfer = TransferFunction::preset(preset, volume.spacing().min_element());
     let far = volume.bounds().radius() * 2.6;
     let camera = look(DVec3::new(0.45, -0.85, 0.3).normalize_or_zero() * far, DVec3::ZERO, 0.7);
+    let scene = scene_of(Shape::Volume(volume));
     let mut stage =
-        Stage::new(scene_of(Shape::Volume(volume)), camera, [1280, 720], Channels::COLOR, THREADS);
+        Stage::with(scene, camera, [1280, 720], Channels::COLOR, THREADS, &[("volume.step", step)]);
+    bencher.bench_local(|| stage.render());
+}
+
+/// Loads a scene or a model.
+fn loaded(path: &Path) -> Option<Scene> {
+    polyptych_core::load::load(path, &LoadOptions::default()).ok()
+}
+
+fn files() -> Vec<String> {
+    let named = std::env::var("POLYPTYCH_BENCH_SCENES").unwrap_or_default();
+    named.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect()
+}
+
+/// Scenes from files, from their first cameras.
+#[divan::bench(args = files())]
+fn scenes(bencher: Bencher, file: &String) {
+    let scene = loaded(Path::new(file)).expect("a scene");
+    let camera = scene.cameras.first().expect("a camera").1.clone();
+    let mut stage = Stage::new(scene, camera, [1024, 1024], Channels::COLOR, 1);
     bencher.bench_local(|| stage.render());
 }

@@ -213,8 +213,8 @@ impl FrameDrawing<'_> {
         let mut colors = [Vec3::ZERO; LANES];
         directions.fill(background, column, &mut colors);
         let mut all = Pixels::BLACK;
-        for i in 0..LANES {
-            all.set(i, colors[i]);
+        for (lane, color) in colors.into_iter().enumerate() {
+            all.set(lane, color);
         }
         all
     }

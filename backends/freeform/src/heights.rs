@@ -225,15 +225,23 @@ impl HeightBody {
 
     /// Finds the first distance in `[near, far]` at which a ray in object space meets the surface, from above or
     /// from below.
+    #[inline(always)]
     fn meet(&self, field: &HeightField, ray: &GridRay, near: f64, far: f64) -> Option<f64> {
         if near > far {
             return None;
         }
+        let last = [field.columns() - 2, field.rows() - 2];
         let mut level = FIRST_LEVEL.min(self.levels.len());
-        let (mut t, mut cell) = (near, ray.cell(near, level, field));
+        let (mut t, mut cell) = (near, ray.cell(near, level, last));
+        let mut y = ray.height + ray.rise * t;
+        // A hair of margin, so that rounding of `t` does not open a slit between cells.
+        let [lowest, highest] = [self.bounds.min.y, self.bounds.max.y];
+        let margin = 1e-12 * (lowest.abs() + highest.abs() + y.abs() + (ray.rise * far).abs());
         loop {
-            let exit = ray.exit(cell, level, far);
-            let (y0, y1) = (ray.height + ray.rise * t, ray.height + ray.rise * exit);
+            let (across, along) = (ray.plane(cell, level, 0), ray.plane(cell, level, 1));
+            let (axis, border) = if along < across { (1, along) } else { (0, across) };
+            let exit = least(border, far);
+            let after = ray.height + ray.rise * exit;
             let mut corners = [0.0; 4];
             let [low, high] = if level > 0 {
                 self.levels[level - 1].range(cell).map(f64::from)
@@ -241,14 +249,13 @@ impl HeightBody {
                 corners = field.cell(cell[0], cell[1]);
                 // All four: a bilinear patch stays between them.
                 let [a, b, c, d] = corners;
-                [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
+                [least(least(a, b), least(c, d)), -least(least(-a, -b), least(-c, -d))]
             };
-            // A hair of margin, so that rounding of `t` does not open a slit between cells.
-            let margin = 1e-12 * (y0.abs() + y1.abs() + high.abs() + low.abs());
-            let passes = y0.min(y1) > high + margin || y0.max(y1) < low - margin;
+            let (bottom, top) = if ray.rise < 0.0 { (after, y) } else { (y, after) };
+            let passes = bottom > high + margin || top < low - margin;
             if !passes && level > 0 {
                 level -= 1;
-                cell = ray.child(cell, level, t, field);
+                cell = ray.child(cell, level, t, last);
                 continue;
             }
             if !passes && let Some(hit) = ray.meet_patch(corners, cell, t, exit) {
@@ -257,9 +264,8 @@ impl HeightBody {
             if exit >= far {
                 return None;
             }
-            let axis;
-            (cell, axis) = ray.next(cell, level, field)?;
-            t = exit;
+            cell = ray.next(cell, axis, last[axis] >> level)?;
+            (t, y) = (exit, after);
             // Go up as long as the parent was entered just now, across the same plane: seen from there the
             // ray is never in doubt which child it is in.
             while level < self.levels.len() && ray.enters_parent(cell, axis) {
@@ -268,6 +274,12 @@ impl HeightBody {
             }
         }
     }
+}
+
+/// Returns the smaller of two numbers.
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
 impl Level {
@@ -335,50 +347,45 @@ impl GridRay {
         Self { start, slope, pace: slope.recip(), height: origin.y, rise: direction.y }
     }
 
-    /// Returns the cell of a level that the ray is in at a distance.
-    fn cell(&self, t: f64, level: usize, field: &HeightField) -> [u32; 2] {
-        let last = last(field, level);
-        std::array::from_fn(|i| {
-            let place = self.start[i] + self.slope[i] * t;
-            ((place.max(0.0) as u32) >> level).min(last[i])
-        })
-    }
-
-    /// Returns where the ray leaves a cell, from the planes of the cell alone.
+    /// Returns the cell of a level that the ray is in at a distance; `last` is the last cell of the grid.
     #[inline(always)]
-    fn exit(&self, cell: [u32; 2], level: usize, far: f64) -> f64 {
-        self.plane(cell, level, 0).min(self.plane(cell, level, 1)).min(far)
+    fn cell(&self, t: f64, level: usize, last: [u32; 2]) -> [u32; 2] {
+        let mut cell = [0; 2];
+        for i in 0..2 {
+            let place = self.start[i] + self.slope[i] * t;
+            cell[i] = (if place > 0.0 { place as u32 } else { 0 }).min(last[i]) >> level;
+        }
+        cell
     }
 
     /// Returns where the ray crosses the far plane of a cell along an axis; infinity where it does not.
     #[inline(always)]
     fn plane(&self, cell: [u32; 2], level: usize, axis: usize) -> f64 {
         let slope = self.slope[axis];
-        let index = u64::from(cell[axis]) + u64::from(slope > 0.0);
-        let t = ((index << level) as f64 - self.start[axis]) * self.pace[axis];
+        // Fewer than 2^31 cells: a field of as many heights as fit into memory has less along an edge.
+        let place = ((cell[axis] + u32::from(slope > 0.0)) << level) as i32;
+        let t = (f64::from(place) - self.start[axis]) * self.pace[axis];
         if slope == 0.0 { f64::INFINITY } else { t }
     }
 
-    /// Returns the cell that follows, and the axis across which it is entered.
+    /// Returns the cell that follows along an axis.
     #[inline(always)]
-    fn next(&self, cell: [u32; 2], level: usize, field: &HeightField) -> Option<([u32; 2], usize)> {
-        let axis = usize::from(self.plane(cell, level, 1) < self.plane(cell, level, 0));
-        let mut next = cell;
-        next[axis] =
-            if self.slope[axis] > 0.0 { cell[axis].checked_add(1)? } else { cell[axis].checked_sub(1)? };
-        (next[axis] <= last(field, level)[axis]).then_some((next, axis))
+    fn next(&self, mut cell: [u32; 2], axis: usize, last: u32) -> Option<[u32; 2]> {
+        let step = if self.slope[axis] > 0.0 { 1 } else { u32::MAX };
+        cell[axis] = cell[axis].wrapping_add(step);
+        (cell[axis] <= last).then_some(cell)
     }
 
     /// Returns which child of a cell the ray is in at `t`.
     #[inline(always)]
-    fn child(&self, cell: [u32; 2], level: usize, t: f64, field: &HeightField) -> [u32; 2] {
-        let last = last(field, level);
-        std::array::from_fn(|i| {
-            let middle = ((u64::from(cell[i]) * 2 + 1) << level) as f64;
+    fn child(&self, mut cell: [u32; 2], level: usize, t: f64, last: [u32; 2]) -> [u32; 2] {
+        for i in 0..2 {
+            let middle = f64::from(((cell[i] * 2 + 1) << level) as i32);
             let place = self.start[i] + self.slope[i] * t;
             let upper = if place == middle { self.slope[i] > 0.0 } else { place > middle };
-            (cell[i] * 2 + u32::from(upper)).min(last[i])
-        })
+            cell[i] = (cell[i] * 2 + u32::from(upper)).min(last[i] >> level);
+        }
+        cell
     }
 
     /// Tells whether the ray, having just entered a cell across an axis, entered its parent too.
@@ -409,12 +416,6 @@ impl GridRay {
         let (first, second) = if s < r { (s, r) } else { (r, s) };
         within(first).or_else(|| within(second))
     }
-}
-
-/// Returns the last cell of a level along both axes.
-#[inline(always)]
-fn last(field: &HeightField, level: usize) -> [u32; 2] {
-    [(field.columns() - 2) >> level, (field.rows() - 2) >> level]
 }
 
 #[cfg(test)]
