@@ -246,6 +246,8 @@ fn wrong_scenes_say_what_is_wrong_where_and_what_to_do() {
                 .to_owned(),
             &["texture `t` is used for colors and for normals", "name its file twice"],
         ),
+        ("t.ron", object("Volume(format: \"1x1x1:u8\", samples: \"H4sIAAAAAAACA2MAAI3vAtIBAAAA\", preset: ct_bones)"), &["line 1", "ct_bones", "ct_bone"]),
+        ("s.ron", object("Volume(format: \"1x1x1:u8\", samples: \"H4sIAAAAAAACA2MAAI3vAtIBAAAA\", preset: ct_bone, transfer: (points: [], reference_length: 1))"), &["both `transfer` and `preset`"]),
         ("q.ron", "(objects: [(shape: Primitive(Sphere(radius: 1)), transform: (scale: 0))])".to_owned(), &["squeezes"]),
     ] {
         let error = folder.load(name, &text).expect_err(name);

@@ -87,6 +87,31 @@ impl Cone {
     }
 }
 
+/// The sides of a tile of a view that keeps straight lines straight: all its rays are between them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sides([(DVec3, f64); 4]);
+
+impl Sides {
+    /// Spans planes between the rays through the corners, in order around the tile.
+    pub(crate) fn between(corners: [(DVec3, DVec3); 4]) -> Self {
+        let ahead = corners.map(|(o, d)| o + d);
+        let middle = ahead.iter().sum::<DVec3>() * 0.25;
+        Self(std::array::from_fn(|i| {
+            let (o, d) = corners[i];
+            let normal = (ahead[(i + 1) % 4] - ahead[i]).cross(d);
+            let normal = if normal.dot(middle - o) < 0.0 { -normal } else { normal };
+            (normal, normal.dot(o) - 1e-9 * normal.length() * o.length())
+        }))
+    }
+
+    /// Tells whether a body of these corners is beyond one of the sides.
+    pub(crate) fn exclude(&self, corners: &[DVec3; 8]) -> bool {
+        self.0.iter().any(|(normal, offset)| {
+            corners.iter().all(|c| normal.dot(*c) < *offset - 1e-9 * normal.length() * c.length())
+        })
+    }
+}
+
 /// What eight rays met first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hits {

@@ -8,10 +8,10 @@
 use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::program::{Active, Program, Step, values_and_gradients};
 use crate::roots::{RayQuadric, Stack, first_roots};
-use glam::{DAffine3, DVec3};
-use polyptych_core::lanes::{DVec3x8, F64x8, Mask8};
+use glam::{DAffine3, DVec3, Vec3};
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
-use polyptych_core::scene::FreeForm;
+use polyptych_core::scene::{FreeForm, Quadric};
 
 /// How often a stretch is halved at most.
 const LEVELS: usize = 6;
@@ -22,6 +22,16 @@ const OVERLAP: f64 = 1e-4;
 
 /// A stretch is halved while it is so much longer than the tile is wide.
 const SLENDER: f64 = 3.0;
+
+/// In which numbers roots are searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Precision {
+    /// Single precision around a point of the solid, then a step of Newton's method in double precision.
+    #[default]
+    Single,
+    /// Double precision throughout.
+    Double,
+}
 
 /// A free form, ready to be cast.
 #[derive(Debug)]
@@ -36,28 +46,108 @@ pub(crate) struct FormBody {
 pub(crate) struct FormScratch {
     /// What matters at each level of halving.
     active: [Active; LEVELS],
-    leaves: Vec<RayQuadric>,
-    stack: Stack,
+    /// The quadrics around the middle of a part.
+    near: Vec<NearQuadric>,
+    /// What matters to eight rays, and the quadrics along them.
+    steps: Vec<Step>,
+    single: Along<F32x8>,
+    double: Along<F64x8>,
     values: Vec<(F64x8, DVec3x8)>,
     alive: Vec<Alive>,
 }
 
-/// Rays in object space that meet the bounds; distances stay those of the world.
+/// Quadrics along eight rays, by leaf, with the stack to reckon with them.
+struct Along<N> {
+    leaves: Vec<RayQuadric<N>>,
+    stack: Stack<N>,
+}
+
+impl<N> Default for Along<N> {
+    fn default() -> Self {
+        Self { leaves: Vec::new(), stack: Stack::default() }
+    }
+}
+
+/// Rays in object space that meet the bounds. Distances are those of the world, counted from where each ray is
+/// nearest to the middle of the bounds, so that they and the places there are small numbers however far the eye is.
 #[derive(Clone, Copy)]
 struct Alive {
     octet: usize,
     origin: DVec3x8,
     direction: DVec3x8,
-    near: F64x8,
-    far: F64x8,
+    /// From where distances are counted.
+    around: F64x8,
+    /// Where that is, from the middle of the bounds.
+    offset: Vec3x8,
+    toward: Vec3x8,
+    near: F32x8,
+    far: F32x8,
     /// Those that have met nothing yet.
     open: Mask8,
 }
 
+/// A quadric around the middle of a part of space, in single precision.
+#[derive(Clone, Copy, Debug)]
+struct NearQuadric {
+    /// Those of `x^2, y^2, z^2` and half of those of `xy, xz, yz`.
+    square: [f32; 6],
+    gradient: Vec3,
+    value: f32,
+    /// Bound on what rounding of places and coefficients changes in the part.
+    slack: f32,
+}
+
+impl NearQuadric {
+    const ZERO: Self = Self { square: [0.0; 6], gradient: Vec3::ZERO, value: 0.0, slack: 0.0 };
+
+    /// Turns a quadric around a point, for places up to `reach` from it that are known to `drift`.
+    fn new(q: &Quadric, point: DVec3, reach: f64, drift: f64) -> Self {
+        let [a, b, c, d, e, f, ..] = q.0;
+        let (value, gradient) = (q.value(point), q.gradient(point));
+        let bend = a.abs() + b.abs() + c.abs() + d.abs() + e.abs() + f.abs();
+        let slope = gradient.abs().element_sum() + 2.0 * bend * reach;
+        let size = value.abs() + (gradient.abs().element_sum() + bend * reach) * reach;
+        let slack = slope * drift + size * 8.0 * f64::from(f32::EPSILON);
+        Self {
+            square: [a, b, c, 0.5 * d, 0.5 * e, 0.5 * f].map(|v| v as f32),
+            gradient: gradient.as_vec3(),
+            value: value as f32,
+            slack: (slack * 1.001) as f32,
+        }
+    }
+
+    /// Returns the quadric along rays through places near the point, looked at up to `reach` from them.
+    #[inline(always)]
+    fn along(&self, place: Vec3x8, toward: Vec3x8, reach: F32x8) -> RayQuadric<F32x8> {
+        let [qa, qb, qc, qd, qe, qf] = self.square.map(F32x8::splat);
+        let g = self.gradient;
+        let Vec3x8 { x, y, z } = place;
+        let Vec3x8 { x: u, y: v, z: w } = toward;
+        let (mx, my, mz) = (qa * x + qd * y + qe * z, qd * x + qb * y + qf * z, qe * x + qf * y + qc * z);
+        let (gx, gy, gz) = (F32x8::splat(g.x) + mx, F32x8::splat(g.y) + my, F32x8::splat(g.z) + mz);
+        let c = F32x8::splat(self.value) + x * gx + y * gy + z * gz;
+        let b = u * (gx + mx) + v * (gy + my) + w * (gz + mz);
+        let (du, dv) = (qd * v + qe * w, qf * w);
+        let a = u * (qa * u + du + du) + v * (qb * v + dv + dv) + qc * w * w;
+        let rounding = F32x8::splat(8.0 * f32::EPSILON);
+        let error = ((a.abs() * reach + b.abs()) * reach + c.abs()) * rounding + F32x8::splat(self.slack);
+        RayQuadric { a, b, c, error }
+    }
+}
+
 /// Bounds of all rays of a tile.
-struct Pyramid {
+pub(crate) struct Pyramid {
     origins: Aabb,
     directions: Aabb,
+}
+
+/// What rays are cast for: the body whose hits they improve, and which roots count.
+#[derive(Clone, Copy)]
+pub(crate) struct Cast<'a> {
+    pub(crate) object_from_world: &'a DAffine3,
+    pub(crate) body: u32,
+    pub(crate) crossing: Crossing,
+    pub(crate) precision: Precision,
 }
 
 impl FormBody {
@@ -71,15 +161,7 @@ impl FormBody {
     }
 
     /// Improves `hits` where a ray meets the form sooner.
-    pub(crate) fn cast(
-        &self,
-        object_from_world: &DAffine3,
-        body: u32,
-        crossing: Crossing,
-        rays: &[Rays],
-        hits: &mut [Hits],
-        scratch: &mut FormScratch,
-    ) {
+    pub(crate) fn cast(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch) {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             #[expect(
@@ -87,38 +169,28 @@ impl FormBody {
                 reason = "a kernel compiled for a processor feature can only be called so"
             )]
             // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.cast_avx2(object_from_world, body, crossing, rays, hits, scratch) };
+            return unsafe { self.cast_avx2(cast, rays, hits, scratch) };
         }
-        self.cast_plain(object_from_world, body, crossing, rays, hits, scratch);
+        self.cast_plain(cast, rays, hits, scratch);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn cast_avx2(
-        &self,
-        object_from_world: &DAffine3,
-        body: u32,
-        crossing: Crossing,
-        rays: &[Rays],
-        hits: &mut [Hits],
-        scratch: &mut FormScratch,
-    ) {
-        self.cast_plain(object_from_world, body, crossing, rays, hits, scratch);
+    fn cast_avx2(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch) {
+        self.cast_plain(cast, rays, hits, scratch);
     }
 
     #[inline(always)]
-    fn cast_plain(
-        &self,
-        object_from_world: &DAffine3,
-        body: u32,
-        crossing: Crossing,
-        rays: &[Rays],
-        hits: &mut [Hits],
-        scratch: &mut FormScratch,
-    ) {
-        self.enter(object_from_world, rays, hits, &mut scratch.alive);
-        let Some((pyramid, near, far)) = bound(&scratch.alive) else { return };
-        scratch.leaves.resize(self.program.leaves.len(), RayQuadric::ZERO);
+    fn cast_plain(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch) {
+        self.enter(cast.object_from_world, rays, hits, &mut scratch.alive);
+        let bounded = scratch
+            .alive
+            .iter()
+            .map(|a| (a.open, a.origin, a.direction, a.around + a.near.to_f64(), a.around + a.far.to_f64()));
+        let Some((pyramid, near, far)) = Pyramid::around(bounded) else { return };
+        scratch.near.resize(self.program.leaves.len(), NearQuadric::ZERO);
+        scratch.single.leaves.resize(self.program.leaves.len(), RayQuadric::ZERO);
+        scratch.double.leaves.resize(self.program.leaves.len(), RayQuadric::ZERO);
         let mut waiting = [(0.0, 0.0, 0); LEVELS + 1];
         waiting[0] = (near, far, 0);
         let mut count = 1;
@@ -139,7 +211,7 @@ impl FormBody {
                 waiting[count] = (middle - overlap, end, level + 1);
                 waiting[count + 1] = (begin, middle + overlap, level + 1);
                 count += 2;
-            } else if !self.search((begin, end), level, body, crossing, hits, scratch) {
+            } else if !self.search((begin, end), &part, level, cast, hits, scratch) {
                 return;
             }
         }
@@ -150,6 +222,8 @@ impl FormBody {
     fn enter(&self, object_from_world: &DAffine3, rays: &[Rays], hits: &[Hits], alive: &mut Vec<Alive>) {
         alive.clear();
         let shift = DVec3x8::splat(object_from_world.translation);
+        let center = self.bounds.center();
+        let half = (self.bounds.size() * 0.5).as_vec3();
         for (octet, (r, hits)) in rays.iter().zip(hits).enumerate() {
             let open = r.open();
             if !open.any() {
@@ -157,11 +231,16 @@ impl FormBody {
             }
             let origin = r.origin.turned(&object_from_world.matrix3) + shift;
             let direction = r.direction.turned(&object_from_world.matrix3);
-            let (enter, leave) = clip(&self.bounds, &origin, &direction);
-            let (near, far) = (enter.max(r.near), leave.min(r.far).min(hits.t));
+            let away = DVec3x8::splat(center) - origin;
+            let around = away.dot(direction) / direction.dot(direction);
+            let offset = (direction.scaled(around) - away).round();
+            let toward = direction.round();
+            let (enter, leave) = clip_near(half, offset, toward);
+            let near = enter.max((r.near - around).round());
+            let far = leave.min((r.far.min(hits.t) - around).round());
             let open = open & far.above(near);
             if open.any() {
-                alive.push(Alive { octet, origin, direction, near, far, open });
+                alive.push(Alive { octet, origin, direction, around, offset, toward, near, far, open });
             }
         }
     }
@@ -171,53 +250,98 @@ impl FormBody {
     fn search(
         &self,
         (begin, end): (f64, f64),
+        part: &Aabb,
         level: usize,
-        body: u32,
-        crossing: Crossing,
+        cast: Cast<'_>,
         hits: &mut [Hits],
         scratch: &mut FormScratch,
     ) -> bool {
-        let FormScratch { active, leaves, stack, alive, values } = scratch;
+        let FormScratch { active, near, steps: own, single, double, alive, values } = scratch;
         let steps = &active[level].steps;
+        let middle = self.set_up(part, steps, near);
         let mut left = false;
         for alive in alive {
-            let (from, to) = (alive.near.max(F64x8::splat(begin)), alive.far.min(F64x8::splat(end)));
+            let since = |t: f64| (F64x8::splat(t) - alive.around).round();
+            let (from, to) = (alive.near.max(since(begin)), alive.far.min(since(end)));
             let open = alive.open & to.above(from);
             left |= alive.open.any();
             if !open.any() {
                 continue;
             }
-            let half = F64x8::splat(0.5);
-            let (around, reach) = ((from + to) * half, (to - from) * half);
-            let rays =
-                Line { point: alive.origin + alive.direction.scaled(around), direction: alive.direction };
+            let half = F32x8::splat(0.5);
+            let (at, reach) = ((from + to) * half, (to - from) * half);
+            let place = alive.offset + alive.toward.scaled(at) - Vec3x8::splat(middle);
             let (found, t) = if let [Step::Leaf(leaf)] = **steps {
-                let along = rays.quadric(&self.program.leaves[leaf as usize].0);
-                let (found, root) = along.first_root(reach, crossing);
-                (found & open, around + root)
+                let rough = near[leaf as usize].along(place, alive.toward, reach);
+                let open = open & !rough.is_nowhere_zero(reach);
+                if !open.any() {
+                    continue;
+                }
+                let start = alive.around + at.to_f64();
+                let along = alive.line(start).quadric(&self.program.leaves[leaf as usize].0);
+                let (found, root) = along.first_root(reach.to_f64(), cast.crossing);
+                (found & open, start + root)
+            } else if cast.precision == Precision::Single {
+                own.clear();
+                for &step in steps {
+                    if let Step::Leaf(leaf) | Step::Bump { leaf, .. } = step {
+                        let along = near[leaf as usize].along(place, alive.toward, reach);
+                        // Bumps that none of the rays comes near add nothing.
+                        let nothing =
+                            matches!(step, Step::Bump { .. }) && !(open & !along.is_nothing(reach)).any();
+                        if nothing {
+                            continue;
+                        }
+                        single.leaves[leaf as usize] = along;
+                    }
+                    own.push(step);
+                }
+                let Along { leaves, stack } = &mut *single;
+                let (found, root) = first_roots(own, leaves, -reach, reach, open, cast.crossing, stack);
+                (found, alive.around + (at + root).to_f64())
             } else {
-                for step in steps {
-                    if let Step::Leaf(leaf) | Step::Bump { leaf, .. } = *step {
-                        let along = rays.quadric(&self.program.leaves[leaf as usize].0);
-                        leaves[leaf as usize] = RayQuadric::new(&along, reach);
+                let start = alive.around + at.to_f64();
+                let (line, reach) = (alive.line(start), reach.to_f64());
+                for &step in steps {
+                    if let Step::Leaf(leaf) | Step::Bump { leaf, .. } = step {
+                        let along = line.quadric(&self.program.leaves[leaf as usize].0);
+                        double.leaves[leaf as usize] = along.bounded(reach);
                     }
                 }
-                let reach = reach.round();
-                let (found, root) = first_roots(steps, leaves, -reach, reach, open, crossing, stack);
-                (found, around + root.to_f64())
+                let Along { leaves, stack } = &mut *double;
+                let (found, root) = first_roots(steps, leaves, -reach, reach, open, cast.crossing, stack);
+                (found, start + root)
             };
             if !found.any() {
                 continue;
             }
-            let (t, normal) = match crossing {
+            let (t, normal) = match cast.crossing {
                 Crossing::Any => self.polish(alive, t, steps, values),
                 // What blocks light is not looked at.
                 Crossing::Entry => (t, NOWHERE),
             };
-            hits[alive.octet].improve(found, t, body, normal);
+            hits[alive.octet].improve(found, t, cast.body, normal);
             alive.open = alive.open & !found;
         }
         left
+    }
+
+    /// Turns what matters in a part around its middle, and returns that, from the middle of the bounds.
+    #[inline(always)]
+    fn set_up(&self, part: &Aabb, steps: &[Step], near: &mut [NearQuadric]) -> Vec3 {
+        let center = self.bounds.center();
+        // Rounded first, so that the places of rays and of coefficients are counted from the same point.
+        let middle = (part.center() - center).as_vec3();
+        let point = center + middle.as_dvec3();
+        // Of offset, direction and distance: one rounding each, and one more of their sum.
+        let drift = self.bounds.radius() * 4.0 * f64::from(f32::EPSILON);
+        for step in steps {
+            if let Step::Leaf(leaf) | Step::Bump { leaf, .. } = *step {
+                let q = &self.program.leaves[leaf as usize];
+                near[leaf as usize] = NearQuadric::new(q, point, part.radius() * 1.01, drift);
+            }
+        }
+        middle
     }
 
     /// Improves distances along rays by a step of Newton's method in double precision and returns them with the
@@ -239,9 +363,36 @@ impl FormBody {
     }
 }
 
+impl Alive {
+    /// Returns the rays around points at a distance.
+    #[inline(always)]
+    fn line(&self, t: F64x8) -> Line {
+        Line { point: self.origin + self.direction.scaled(t), direction: self.direction }
+    }
+}
+
+/// Returns where rays enter and leave a box around the origin; rays in a face plane are inside.
+#[inline(always)]
+fn clip_near(half: Vec3, offset: Vec3x8, toward: Vec3x8) -> (F32x8, F32x8) {
+    let infinity = F32x8::splat(f32::INFINITY);
+    let (mut near, mut far) = (-infinity, infinity);
+    for (o, d, half) in
+        [(offset.x, toward.x, half.x), (offset.y, toward.y, half.y), (offset.z, toward.z, half.z)]
+    {
+        let half = F32x8::splat(half);
+        let one_over = F32x8::splat(1.0) / d;
+        let (a, b) = ((-half - o) * one_over, (half - o) * one_over);
+        let flat = d.equal(F32x8::ZERO);
+        let outside = flat & o.abs().above(half);
+        near = flat.pick(near, near.max(a.min(b)));
+        far = outside.pick(-infinity, flat.pick(far, far.min(a.max(b))));
+    }
+    (near, far)
+}
+
 /// Returns where rays enter and leave a box, as [`Aabb::clip`]; rays in a face plane are inside.
 #[inline(always)]
-fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) {
+pub(crate) fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) {
     let infinity = F64x8::splat(f64::INFINITY);
     let (mut near, mut far) = (F64x8::ZERO, infinity);
     let axes = [
@@ -261,31 +412,50 @@ fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) 
     (near, far)
 }
 
-/// Bounds all open rays, with the range of their distances; nothing if there are none.
-#[inline(always)]
-fn bound(alive: &[Alive]) -> Option<(Pyramid, f64, f64)> {
-    let (top, bottom) = (F64x8::splat(f64::INFINITY), F64x8::splat(f64::NEG_INFINITY));
-    let (mut low, mut high) = ([top; 7], [bottom; 7]);
-    for a in alive {
-        let numbers = [a.origin.x, a.origin.y, a.origin.z, a.direction.x, a.direction.y, a.direction.z];
-        for (i, v) in numbers.into_iter().enumerate() {
-            low[i] = low[i].min(F64x8::pick(a.open, v, top));
-            high[i] = high[i].max(F64x8::pick(a.open, v, bottom));
-        }
-        low[6] = low[6].min(F64x8::pick(a.open, a.near, top));
-        high[6] = high[6].max(F64x8::pick(a.open, a.far, bottom));
-    }
-    let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
-    let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));
-    let boxed = |i: usize| {
-        Aabb::new(DVec3::new(low[i], low[i + 1], low[i + 2]), DVec3::new(high[i], high[i + 1], high[i + 2]))
-    };
-    (low[6] < high[6]).then(|| (Pyramid { origins: boxed(0), directions: boxed(3) }, low[6], high[6]))
-}
-
 impl Pyramid {
+    /// Bounds rays of which some are open, with the range of their distances; nothing if there are none.
+    #[inline(always)]
+    pub(crate) fn around(
+        rays: impl Iterator<Item = (Mask8, DVec3x8, DVec3x8, F64x8, F64x8)>,
+    ) -> Option<(Self, f64, f64)> {
+        let (top, bottom) = (F64x8::splat(f64::INFINITY), F64x8::splat(f64::NEG_INFINITY));
+        let (mut low, mut high) = ([top; 7], [bottom; 7]);
+        for (open, o, d, near, far) in rays {
+            let numbers = [o.x, o.y, o.z, d.x, d.y, d.z];
+            if (!open).any() {
+                for i in 0..6 {
+                    low[i] = low[i].min(F64x8::pick(open, numbers[i], top));
+                    high[i] = high[i].max(F64x8::pick(open, numbers[i], bottom));
+                }
+                low[6] = low[6].min(F64x8::pick(open, near, top));
+                high[6] = high[6].max(F64x8::pick(open, far, bottom));
+            } else {
+                for i in 0..6 {
+                    low[i] = low[i].min(numbers[i]);
+                    high[i] = high[i].max(numbers[i]);
+                }
+                low[6] = low[6].min(near);
+                high[6] = high[6].max(far);
+            }
+        }
+        let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
+        let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));
+        let boxed = |i: usize| {
+            let [from, to] = [&low, &high].map(|v| DVec3::new(v[i], v[i + 1], v[i + 2]));
+            Aabb::new(from, to)
+        };
+        (low[6] <= high[6]).then(|| (Self { origins: boxed(0), directions: boxed(3) }, low[6], high[6]))
+    }
+
+    /// Returns how wide all rays together are at a distance.
+    #[inline(always)]
+    pub(crate) fn width(&self, t: f64) -> f64 {
+        (self.origins.size() + self.directions.size() * t).max_element()
+    }
+
     /// Bounds the places of all rays between two distances.
-    fn between(&self, a: f64, b: f64) -> Aabb {
+    #[inline(always)]
+    pub(crate) fn between(&self, a: f64, b: f64) -> Aabb {
         let (d, o) = (&self.directions, &self.origins);
         let (low, high) = ((d.min * a).min(d.min * b), (d.max * a).max(d.max * b));
         Aabb::new(o.min + low, o.max + high)
@@ -293,8 +463,7 @@ impl Pyramid {
 
     /// Tells whether the rays between two distances are much longer than all of them together are wide.
     fn is_slender(&self, a: f64, b: f64) -> bool {
-        let wide = (self.origins.size() + self.directions.size() * b).max_element();
-        self.directions.center().length() * (b - a) > SLENDER * wide
+        self.directions.center().length() * (b - a) > SLENDER * self.width(b)
     }
 }
 
@@ -329,6 +498,14 @@ impl Line {
 }
 
 impl Parabola {
+    /// Returns it with a bound on its rounding error up to `reach` from the points.
+    #[inline(always)]
+    fn bounded(&self, reach: F64x8) -> RayQuadric<F64x8> {
+        let Self { a, b, c } = *self;
+        let error = ((a.abs() * reach + b.abs()) * reach + c.abs()) * F64x8::splat(16.0 * f64::EPSILON);
+        RayQuadric { a, b, c, error }
+    }
+
     /// Finds the first roots in `[-reach, reach]`, in closed form: without cancellation, as in *Numerical
     /// Recipes* 5.6.
     #[inline(always)]
@@ -361,21 +538,23 @@ pub(crate) mod tests {
     use super::*;
     use polyptych_core::lanes::LANES;
 
-    /// Returns quadrics along rays, looked at up to `reach` around one distance.
+    /// Returns quadrics along rays in single precision, looked at up to `reach` around one distance, from a point
+    /// that no ray is further from than `size`.
     pub(crate) fn along(
         program: &Program,
         rays: &[(DVec3, DVec3); LANES],
-        around: f64,
-        reach: f64,
-    ) -> Vec<RayQuadric> {
-        let (mut point, mut direction) = (NOWHERE, NOWHERE);
+        (around, reach): (f64, f64),
+        (point, size): (DVec3, f64),
+    ) -> Vec<RayQuadric<F32x8>> {
+        let (mut place, mut toward) = (NOWHERE, NOWHERE);
         for (i, &(o, d)) in rays.iter().enumerate() {
-            point.set(i, o + d * around);
-            direction.set(i, d);
+            place.set(i, o + d * around - point);
+            toward.set(i, d);
         }
-        let line = Line { point, direction };
-        let reach = F64x8::splat(reach);
-        program.leaves.iter().map(|q| RayQuadric::new(&line.quadric(&q.0), reach)).collect()
+        let (place, toward, reach) = (place.round(), toward.round(), F32x8::splat(reach as f32));
+        let drift = size * 4.0 * f64::from(f32::EPSILON);
+        let near = |q: &Quadric| NearQuadric::new(q, point, size, drift).along(place, toward, reach);
+        program.leaves.iter().map(near).collect()
     }
 
     /// Casts rays at the figure that uses every step, with the widest registers and with the plainest.
@@ -398,14 +577,15 @@ pub(crate) mod tests {
             }
             rays.push(Rays { origin, direction, near: F64x8::ZERO, far: F64x8::splat(9.0) });
         }
-        let bits = |wide: bool, crossing: Crossing| {
+        let bits = |wide: bool, (crossing, precision): (Crossing, Precision)| {
             let mut hits: Vec<Hits> = rays.iter().map(Hits::nothing).collect();
             let mut scratch = FormScratch::default();
             let place = DAffine3::from_rotation_y(0.3);
+            let cast = Cast { object_from_world: &place, body: 7, crossing, precision };
             if wide {
-                body.cast(&place, 7, crossing, &rays, &mut hits, &mut scratch);
+                body.cast(cast, &rays, &mut hits, &mut scratch);
             } else {
-                body.cast_plain(&place, 7, crossing, &rays, &mut hits, &mut scratch);
+                body.cast_plain(cast, &rays, &mut hits, &mut scratch);
             }
             let numbers = |h: &Hits| {
                 let normal = h.normal;
@@ -413,10 +593,12 @@ pub(crate) mod tests {
             };
             hits.iter().map(numbers).collect::<Vec<_>>()
         };
-        for crossing in [Crossing::Any, Crossing::Entry] {
-            let (wide, plain) = (bits(true, crossing), bits(false, crossing));
+        let ways = [Crossing::Any, Crossing::Entry]
+            .map(|c| [Precision::Single, Precision::Double].map(|precision| (c, precision)));
+        for way in ways.into_iter().flatten() {
+            let (wide, plain) = (bits(true, way), bits(false, way));
             let met = wide.iter().flat_map(|h| h.0).filter(|b| *b == 7).count();
-            assert!(wide == plain, "{crossing:?}");
+            assert!(wide == plain, "{way:?}");
             assert!((60..240).contains(&met), "{met} of 256");
         }
     }

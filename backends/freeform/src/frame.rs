@@ -1,25 +1,16 @@
 //! A picture, tile by tile: what is met first, then what is seen through, then the light on it.
 
-use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, TILE};
-use crate::form::FormScratch;
+use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, Sides, TILE};
 use crate::light::{Illumination, Lit};
-use crate::volume::{Gathered, March, OPAQUE, Shine};
-use crate::world::{Body, Geometry, World};
+use crate::volume::{Gathered, March, OPAQUE};
+use crate::world::{Body, CastScratch, Geometry, World};
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::View;
 use polyptych_core::framebuffer::{Band, Channel, Channels};
 use polyptych_core::lanes::{F32x8, F64x8, LANES, Mask8, Vec3x8};
-use polyptych_core::math::Aabb;
 use polyptych_core::scene::Shape;
 use polyptych_core::seam::Control;
 use polyptych_core::shade::{facing, fogged};
-
-/// How to draw.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Options {
-    /// Step through volumes in units of the smallest spacing.
-    pub(crate) volume_step: f64,
-}
 
 /// Scratch memory for one band.
 #[derive(Default)]
@@ -34,9 +25,33 @@ pub(crate) struct Scratch {
     /// Bodies that the rays of the tile may meet.
     bodies: Vec<u32>,
     light: crate::light::Scratch,
-    form: FormScratch,
-    shines: Vec<Shine>,
+    form: CastScratch,
+    /// Parts of one ray in volumes.
+    stretches: Vec<Stretch>,
     pub(crate) traced: u64,
+}
+
+/// The part of a ray in one volume.
+struct Stretch {
+    body: u32,
+    /// The ray in object space.
+    origin: DVec3,
+    direction: DVec3,
+    /// Where it enters the volume; samples are counted from there.
+    enter: f64,
+    step: f64,
+    /// Those that are left.
+    samples: std::ops::Range<u32>,
+}
+
+impl Stretch {
+    fn begin(&self) -> f64 {
+        self.enter + f64::from(self.samples.start) * self.step
+    }
+
+    fn end(&self) -> f64 {
+        self.enter + f64::from(self.samples.end) * self.step
+    }
 }
 
 /// What one frame is drawn with.
@@ -44,7 +59,6 @@ pub(crate) struct FrameDrawing<'a> {
     pub(crate) world: &'a World,
     pub(crate) view: View<'a>,
     pub(crate) channels: Channels,
-    pub(crate) options: Options,
 }
 
 impl FrameDrawing<'_> {
@@ -93,12 +107,30 @@ impl FrameDrawing<'_> {
         lit: &mut [Lit<'a>; OCTETS],
         scratch: &mut Scratch,
     ) {
-        self.aim(band, first, scratch);
-        let cone = Cone::around(&scratch.rays);
-        let touched = |body: &Body| cone.is_none_or(|c| c.touches(body.center, body.radius));
+        // Where straight lines stay straight the corners bound all rays, which need not be known.
+        let straight = self.view.row(band.first_row).is_some();
+        let (cone, sides) = if straight {
+            let corners = self.corners(band, first);
+            let around = [1, 0, 2, 3].map(|i| (corners.origin.get(i), corners.direction.get(i)));
+            (Cone::around(&[corners]), Some(Sides::between(around)))
+        } else {
+            self.aim(band, first, scratch);
+            (Cone::around(&scratch.rays), None)
+        };
+        let touched = |body: &Body| {
+            cone.is_none_or(|c| c.touches(body.center, body.radius))
+                && !sides.is_some_and(|s| s.exclude(&body.corners))
+        };
         let bodies = self.world.bodies.iter().enumerate().filter(|(_, b)| touched(b)).map(|(i, _)| i as u32);
         scratch.bodies.clear();
         scratch.bodies.extend(bodies);
+        if straight {
+            if scratch.bodies.is_empty() {
+                self.leave_empty(band, first, scratch);
+                return;
+            }
+            self.aim(band, first, scratch);
+        }
         scratch.opaque.clear();
         scratch.opaque.extend(scratch.rays.iter().map(Hits::nothing));
         let has = |wanted: fn(&Body) -> bool| {
@@ -112,21 +144,79 @@ impl FrameDrawing<'_> {
             &mut scratch.opaque,
             &mut scratch.form,
         );
+        let through = layered || volumes;
+        if !through && !self.reads_surfaces() {
+            for (octet, hits) in scratch.opaque.iter().enumerate() {
+                let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
+                if row < band.rows && column < band.width {
+                    self.put_place(band, column, row, hits);
+                }
+            }
+            return;
+        }
         scratch.pixels.clear();
         scratch.pixels.resize(OCTETS, Pixels::NOTHING);
-        let through = layered || volumes;
         if through {
             scratch.gathered.clear();
             scratch.gathered.resize(OCTETS, [Gathered::NOTHING; LANES]);
             self.look_through(layered, volumes, lit, scratch);
         }
-        self.finish(through, lit, scratch);
+        self.finish((first, band.first_row), through, lit, scratch);
         for (octet, pixels) in scratch.pixels.iter().enumerate() {
             let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
             if row < band.rows && column < band.width {
                 pixels.put(band, column, row);
             }
         }
+    }
+
+    /// Returns the rays through the corners of a tile of a view that keeps straight lines straight.
+    #[inline(always)]
+    fn corners(&self, band: &Band<'_>, first: u32) -> Rays {
+        let mut x = F64x8::splat(f64::from(first));
+        (0..LANES).step_by(2).for_each(|i| x.0[i] = f64::from(band.width.min(first + TILE)));
+        let row = f64::from(band.first_row);
+        let (mut origin, mut direction, _) = self.view.rays(x, row);
+        let lower = self.view.rays(x, row + f64::from(band.rows));
+        for i in 0..2 {
+            origin.set(i, lower.0.get(i));
+            direction.set(i, lower.1.get(i));
+        }
+        Rays { origin, direction, near: F64x8::ZERO, far: F64x8::splat(f64::INFINITY) }
+    }
+
+    /// Fills a tile in which nothing is met.
+    #[inline(always)]
+    fn leave_empty(&self, band: &mut Band<'_>, first: u32, scratch: &mut Scratch) {
+        let columns = TILE.min(band.width - first);
+        scratch.traced += u64::from(columns * band.rows);
+        for row in 0..band.rows {
+            for column in (first..first + columns).step_by(LANES) {
+                Pixels::NOTHING.put(band, column, row);
+            }
+            let begin = (row * band.width + first) as usize;
+            if let (Some(colors), Some(directions)) =
+                (band.color.get_mut(begin..begin + columns as usize), self.view.row(band.first_row + row))
+            {
+                directions.fill(&self.world.scene.environment.background, first, colors);
+            }
+        }
+    }
+
+    /// Returns what is seen of the background behind eight pixels.
+    #[inline(always)]
+    fn background(&self, column: u32, row: u32, rays: &Rays) -> Vec3x8 {
+        let background = &self.world.scene.environment.background;
+        let Some(directions) = self.view.row(row) else {
+            return background.gradient().colors(rays.direction.y.round()).finite();
+        };
+        let mut colors = [Vec3::ZERO; LANES];
+        directions.fill(background, column, &mut colors);
+        let mut all = Pixels::BLACK;
+        for (lane, color) in colors.into_iter().enumerate() {
+            all.set(lane, color);
+        }
+        all
     }
 
     /// Sets up the rays through the middles of the pixels.
@@ -154,7 +244,7 @@ impl FrameDrawing<'_> {
         bodies: &[u32],
         rays: &[Rays],
         hits: &mut [Hits],
-        form: &mut FormScratch,
+        form: &mut CastScratch,
     ) {
         for &index in bodies {
             let body = &self.world.bodies[index as usize];
@@ -162,6 +252,27 @@ impl FrameDrawing<'_> {
                 body.cast(index, Crossing::Any, rays, hits, form);
             }
         }
+    }
+
+    /// Tells whether more is asked of surfaces than which they are and where.
+    fn reads_surfaces(&self) -> bool {
+        [Channel::Color, Channel::Shadow, Channel::Normal, Channel::Albedo]
+            .iter()
+            .any(|&c| self.channels.has(c))
+    }
+
+    /// Writes what eight rays met, and where.
+    #[inline(always)]
+    fn put_place(&self, band: &mut Band<'_>, column: u32, row: u32, hits: &Hits) {
+        let count = LANES.min((band.width - column) as usize);
+        let first = row as usize * band.width as usize + column as usize;
+        let met = hits.any();
+        let distance = met.pick(hits.t.round(), F32x8::splat(f32::INFINITY));
+        put(band.distance, first, count, |i| distance.0[i]);
+        put(band.coverage, first, count, |i| if met.has(i) { 1.0 } else { 0.0 });
+        put(band.id, first, count, |i| {
+            self.world.bodies.get(hits.body.0[i] as usize).map_or(0, |b| b.object as u32 + 1)
+        });
     }
 
     fn illumination(&self) -> Illumination<'_> {
@@ -245,75 +356,104 @@ impl FrameDrawing<'_> {
     fn march(&self, octet: usize, lane: usize, end: f64, scratch: &mut Scratch) {
         let rays = &scratch.through[octet];
         let (eye, toward, near) = (rays.origin.get(lane), rays.direction.get(lane), rays.near.0[lane]);
+        scratch.stretches.clear();
         for &index in &scratch.bodies {
             let body = &self.world.bodies[index as usize];
-            let (Geometry::Volume(volume), Shape::Volume(shape)) = (&*body.geometry, &*body.shape) else {
-                continue;
-            };
+            let Geometry::Volume(volume) = &*body.geometry else { continue };
             let origin = body.object_from_world.transform_point3(eye);
             let direction = body.object_from_world.transform_vector3(toward);
-            let bounds: Aabb =
-                shape.shell.as_ref().map_or(shape.bounds(), |s| s.bounds().intersection(shape.bounds()));
-            let Some((enter, leave)) = bounds.clip(origin, direction) else { continue };
-            let object_per_world = direction.length();
-            let step = self.options.volume_step * shape.spacing().min_element() / object_per_world;
+            let Some((enter, leave)) = body.local_bounds.clip(origin, direction) else { continue };
+            let step = volume.step / direction.length();
             // Samples keep their places whatever layers cut the ray: each belongs to the part it stands in.
             let count = ((leave.min(end) - enter) / step - 0.5).ceil().clamp(0.0, f64::from(u32::MAX / 4));
-            let first = ((near - enter) / step - 0.5).ceil().clamp(0.0, count);
-            let scene = &self.world.scene;
-            let material = scene.material(&scene.objects[body.object], 0);
-            self.shine_on(body.center, &mut scratch.shines);
-            let march = March {
-                volume: shape,
-                material,
-                environment: &scene.environment,
-                origin,
-                direction,
-                step,
-                object_per_world,
-                normal_map: body.normal_map,
-                to_eye: -toward.as_vec3(),
-            };
-            let sum = &mut scratch.gathered[octet][lane];
-            let was_half = sum.half;
-            volume.march(&march, enter, first as u32..count as u32, &scratch.shines, sum);
-            if let (None, Some(t)) = (was_half, sum.half) {
-                let pixels = &mut scratch.pixels[octet];
-                if pixels.id.0[lane] == 0 {
-                    (pixels.id.0[lane], pixels.distance.0[lane]) = (body.object as u32 + 1, t as f32);
-                    let p = origin + direction * t;
-                    let normal = body.normal_map * -shape.gradient(p);
-                    pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
-                    pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
-                }
+            let first = ((near - enter) / step - 0.5).ceil().clamp(0.0, count) as u32;
+            if first < count as u32 {
+                let samples = first..count as u32;
+                scratch.stretches.push(Stretch { body: index, origin, direction, enter, step, samples });
             }
+        }
+        let stretches = &mut scratch.stretches;
+        stretches.sort_unstable_by(|a, b| a.begin().total_cmp(&b.begin()).then(a.body.cmp(&b.body)));
+        let sum = &mut scratch.gathered[octet][lane];
+        let pixels = &mut scratch.pixels[octet];
+        // Where volumes overlap they take turns, slice by slice, as thick as the longest of their steps.
+        while let Some(first) = stretches.first() {
+            let begin = first.begin();
+            let over = |s: &Stretch| s.begin() < first.end();
+            let together = stretches.iter().take_while(|s| over(s)).count();
+            let slice = stretches[..together].iter().map(|s| s.step).fold(0.0, f64::max);
+            let until = if together == 1 { f64::INFINITY } else { begin + slice };
+            for stretch in &mut stretches[..together] {
+                self.march_stretch(stretch, until, toward, sum, (pixels, lane));
+            }
+            stretches.retain(|s| !s.samples.is_empty() && sum.transparency >= OPAQUE);
+            stretches.sort_unstable_by(|a, b| a.begin().total_cmp(&b.begin()).then(a.body.cmp(&b.body)));
         }
     }
 
-    /// Lists the lights as they arrive at the middle of a volume.
-    fn shine_on(&self, center: DVec3, shines: &mut Vec<Shine>) {
-        shines.clear();
-        shines.extend(
-            self.world
-                .lights
-                .iter()
-                .filter_map(|light| light.arriving(center))
-                .map(|a| Shine { to_light: a.to_light.as_vec3(), radiance: a.radiance }),
-        );
+    /// Adds the samples of a volume up to a distance.
+    fn march_stretch(
+        &self,
+        stretch: &mut Stretch,
+        until: f64,
+        toward: DVec3,
+        sum: &mut Gathered,
+        (pixels, lane): (&mut Pixels, usize),
+    ) {
+        let body = &self.world.bodies[stretch.body as usize];
+        let (Geometry::Volume(volume), Shape::Volume(shape)) = (&*body.geometry, &*body.shape) else {
+            return;
+        };
+        let count = ((until - stretch.enter) / stretch.step - 0.5).ceil();
+        let last = (count.clamp(0.0, f64::from(u32::MAX / 2)) as u32)
+            .clamp(stretch.samples.start, stretch.samples.end);
+        let scene = &self.world.scene;
+        let march = March {
+            volume: shape,
+            material: scene.material(&scene.objects[body.object], 0),
+            environment: &scene.environment,
+            shines: &body.shines,
+            origin: stretch.origin,
+            direction: stretch.direction,
+            step: stretch.step,
+            normal_map: body.normal_map.as_mat3(),
+            to_eye: -toward.as_vec3(),
+        };
+        let was_half = sum.half;
+        volume.march(&march, stretch.enter, stretch.samples.start..last, sum);
+        stretch.samples.start = last;
+        if let (None, Some(t)) = (was_half, sum.half)
+            && pixels.id.0[lane] == 0
+        {
+            (pixels.id.0[lane], pixels.distance.0[lane]) = (body.object as u32 + 1, t as f32);
+            let p = stretch.origin + stretch.direction * t;
+            let normal = body.normal_map * -shape.gradient(p);
+            pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
+            pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
+        }
     }
 
     /// Lights the opaque surfaces, lays what was gathered over them, and fills the pixels.
     #[inline(always)]
-    fn finish<'a>(&'a self, through: bool, lit: &mut [Lit<'a>; OCTETS], scratch: &mut Scratch) {
+    fn finish<'a>(
+        &'a self,
+        (first, first_row): (u32, u32),
+        through: bool,
+        lit: &mut [Lit<'a>; OCTETS],
+        scratch: &mut Scratch,
+    ) {
         let Scratch { rays, opaque, light, form, traced, .. } = &mut *scratch;
-        let background = self.world.scene.environment.background.gradient();
-        if opaque.iter().any(|hits| hits.any().any()) {
+        let reads_color = self.channels.has(Channel::Color);
+        if self.reads_surfaces() && opaque.iter().any(|hits| hits.any().any()) {
             self.illumination().light(rays, opaque, lit, (light, form), traced);
         }
         for octet in 0..OCTETS {
             let (hits, met) = (&scratch.opaque[octet], scratch.opaque[octet].any());
             let pixels = &mut scratch.pixels[octet];
-            pixels.color = background.colors(scratch.rays[octet].direction.y.round()).finite();
+            if reads_color {
+                let (row, column) = ((octet / COLUMNS) as u32, (octet % COLUMNS * LANES) as u32);
+                pixels.color = self.background(first + column, first_row + row, &scratch.rays[octet]);
+            }
             if met.any() {
                 let lit = &lit[octet];
                 self.first_surface(pixels, lit, hits, met);
@@ -339,14 +479,15 @@ impl FrameDrawing<'_> {
     /// Fills the geometry channels of pixels that show nothing yet.
     #[inline(always)]
     fn first_surface(&self, pixels: &mut Pixels, lit: &Lit<'_>, hits: &Hits, met: Mask8) {
-        let mut free = met;
+        let (mut free, mut ids) = (met, Mask8::NONE);
         for i in 0..LANES {
-            if pixels.id.0[i] != 0 {
-                free.0[i] = 0;
-            }
-            if free.has(i) {
-                pixels.id.0[i] = self.world.bodies[hits.body.0[i] as usize].object as u32 + 1;
-                if lit.casting.0[i] > 0 {
+            free.0[i] &= if pixels.id.0[i] == 0 { u32::MAX } else { 0 };
+            ids.0[i] = self.world.bodies.get(hits.body.0[i] as usize).map_or(0, |b| b.object as u32 + 1);
+        }
+        pixels.id = free.pick_bits(ids, pixels.id);
+        if self.channels.has(Channel::Shadow) {
+            for i in 0..LANES {
+                if free.has(i) && lit.casting.0[i] > 0 {
                     pixels.shadow.0[i] = 1.0 - lit.dark.0[i] as f32 / lit.casting.0[i] as f32;
                 }
             }

@@ -1,18 +1,35 @@
 //! How does a ray meet a height field?
 //!
-//! The ray walks the cells of a pyramid of lowest and highest heights: a cell that the ray passes above or below
-//! is jumped in one step, else its four children are looked at; at the bottom the ray meets a bilinear patch, a
-//! quadratic equation. Source: A. Tevs, I. Ihrke, H.-P. Seidel, *Maximum mipmaps for fast, accurate, and scalable
-//! dynamic height field rendering*, I3D 2008.
+//! The rays of a tile are bounded together first: stretches in which all of them are above the highest or below the
+//! lowest of the heights there are jumped, for the tile and then for each of its blocks. From there each ray walks
+//! the cells of a pyramid of lowest and highest heights: a cell that it passes above or below is jumped in one step,
+//! else its four children are looked at; at the bottom the ray meets a bilinear patch, a quadratic equation. Source:
+//! A. Tevs, I. Ihrke, H.-P. Seidel, *Maximum mipmaps for fast, accurate, and scalable dynamic height field
+//! rendering*, I3D 2008.
 
-use glam::{DVec2, DVec3};
+use crate::bundle::{COLUMNS, Hits, OCTETS, Rays};
+use crate::form::{Pyramid, clip};
+use glam::{DAffine3, DVec2, DVec3};
+use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
+use polyptych_core::math::Aabb;
 use polyptych_core::scene::HeightField;
+
+/// Rows of a block of rays that is bounded by itself.
+const BLOCK_ROWS: usize = 4;
+
+/// Level at which a ray begins to walk where a block of rays was stopped.
+const FIRST_LEVEL: usize = 2;
+
+/// Most cells along an edge of the box around a stretch of rays that are looked at.
+const CELLS: i64 = 3;
 
 /// A height field with its pyramid.
 #[derive(Debug)]
 pub(crate) struct HeightBody {
-    /// Level 0 has one entry a cell; each next level one for 2x2.
+    /// Level 1 has one entry for 2x2 cells; each next level one for 2x2 of those. The single cells' heights are read
+    /// from the field.
     levels: Vec<Level>,
+    bounds: Aabb,
 }
 
 #[derive(Debug)]
@@ -22,30 +39,39 @@ struct Level {
     ranges: Vec<[f32; 2]>,
 }
 
+/// Scratch memory of one worker: the rays of a tile in object space.
+#[derive(Default)]
+pub(crate) struct HeightScratch {
+    rays: Vec<Local>,
+}
+
+/// Eight rays in object space with the stretch in which they may meet something.
+#[derive(Clone, Copy)]
+struct Local {
+    origin: DVec3x8,
+    direction: DVec3x8,
+    near: F64x8,
+    far: F64x8,
+    open: Mask8,
+}
+
 impl HeightBody {
     pub(crate) fn new(field: &HeightField) -> Self {
-        let (columns, rows) = (field.columns() - 1, field.rows() - 1);
-        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-        let ranges = cells
-            .map(|(column, row)| {
-                // All four corners: a bilinear patch stays between them.
-                let h = field.cell(column, row).map(|h| h as f32);
-                [h[0].min(h[1]).min(h[2].min(h[3])), h[0].max(h[1]).max(h[2].max(h[3]))]
-            })
-            .collect();
-        let mut levels = vec![Level { columns, rows, ranges }];
+        let mut levels = vec![Level::first(field)];
         while let Some(next) = levels.last().and_then(Level::halved) {
             levels.push(next);
         }
-        Self { levels }
+        Self { levels, bounds: field.bounds() }
     }
 
-    /// Returns what [`HeightBody::bytes`] will be: ranges of cells, of blocks of four cells, and so on.
+    /// Returns what [`HeightBody::bytes`] will be: ranges of blocks of four cells, of four of those, and so on.
     pub(crate) fn planned_bytes(field: &HeightField) -> u64 {
-        let (mut columns, mut rows) = (u64::from(field.columns() - 1), u64::from(field.rows() - 1));
+        let halved = |n: u64| n.div_ceil(2);
+        let (mut columns, mut rows) =
+            (halved(u64::from(field.columns() - 1)), halved(u64::from(field.rows() - 1)));
         let mut ranges = columns * rows;
         while columns * rows > 1 {
-            (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
+            (columns, rows) = (halved(columns), halved(rows));
             ranges += columns * rows;
         }
         ranges * 8
@@ -55,50 +81,194 @@ impl HeightBody {
         self.levels.iter().map(|l| l.ranges.len() as u64 * 8).sum()
     }
 
-    /// Finds the first distance in `[near, far]` at which a ray in object space meets the surface, from above or
-    /// from below.
+    /// Improves `hits` where a ray of a tile meets the surface sooner.
     pub(crate) fn cast(
         &self,
         field: &HeightField,
-        origin: DVec3,
-        direction: DVec3,
-        near: f64,
-        far: f64,
-    ) -> Option<f64> {
-        let size = field.cell_size();
-        let start = field.grid_from_plane(origin.x, origin.z);
-        let ray = GridRay {
-            start,
-            slope: DVec2::new(direction.x, direction.z) / size,
-            height: origin.y,
-            rise: direction.y,
-        };
-        let mut level = self.levels.len() - 1;
-        let (mut t, mut cell) = (near, [0u32; 2]);
-        loop {
-            let exit = ray.exit(cell, level, far);
-            let (y0, y1) = (ray.height + ray.rise * t, ray.height + ray.rise * exit);
-            let [low, high] = self.levels[level].range(cell).map(f64::from);
-            // A hair of margin, so that rounding of `t` does not open a slit between cells.
-            let margin = 1e-12 * (y0.abs() + y1.abs() + high.abs() + low.abs());
-            let passes = y0.min(y1) > high + margin || y0.max(y1) < low - margin;
-            if !passes && level > 0 {
-                level -= 1;
-                cell = ray.child(cell, level, t, &self.levels[level]);
+        object_from_world: &DAffine3,
+        body: u32,
+        rays: &[Rays],
+        hits: &mut [Hits],
+        scratch: &mut HeightScratch,
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.cast_avx2(field, object_from_world, body, rays, hits, scratch) };
+        }
+        self.cast_plain(field, object_from_world, body, rays, hits, scratch);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn cast_avx2(
+        &self,
+        field: &HeightField,
+        object_from_world: &DAffine3,
+        body: u32,
+        rays: &[Rays],
+        hits: &mut [Hits],
+        scratch: &mut HeightScratch,
+    ) {
+        self.cast_plain(field, object_from_world, body, rays, hits, scratch);
+    }
+
+    #[inline(always)]
+    fn cast_plain(
+        &self,
+        field: &HeightField,
+        object_from_world: &DAffine3,
+        body: u32,
+        rays: &[Rays],
+        hits: &mut [Hits],
+        scratch: &mut HeightScratch,
+    ) {
+        self.enter(object_from_world, rays, hits, &mut scratch.rays);
+        let Some(start) = self.first_near(field, &scratch.rays, 0.0, 1.0) else { return };
+        // Blocks of the same columns and a few rows: as wide as high.
+        for first in (0..OCTETS).step_by(BLOCK_ROWS * COLUMNS) {
+            for column in 0..COLUMNS {
+                let octets: [usize; BLOCK_ROWS] = std::array::from_fn(|row| first + row * COLUMNS + column);
+                let block = octets.map(|octet| scratch.rays[octet]);
+                let Some(start) = self.first_near(field, &block, start, 0.25) else { continue };
+                for octet in octets {
+                    self.walk(field, &scratch.rays[octet], start, body, &mut hits[octet]);
+                }
+            }
+        }
+    }
+
+    /// Turns rays into object space and cuts them to the bounds and to what they met already.
+    #[inline(always)]
+    fn enter(&self, object_from_world: &DAffine3, rays: &[Rays], hits: &[Hits], locals: &mut Vec<Local>) {
+        locals.clear();
+        let shift = DVec3x8::splat(object_from_world.translation);
+        for (r, hits) in rays.iter().zip(hits) {
+            let origin = r.origin.turned(&object_from_world.matrix3) + shift;
+            let direction = r.direction.turned(&object_from_world.matrix3);
+            let (enter, leave) = clip(&self.bounds, &origin, &direction);
+            let (near, far) = (enter.max(r.near), leave.min(r.far).min(hits.t));
+            let open = r.open() & far.at_least(near);
+            locals.push(Local { origin, direction, near, far, open });
+        }
+    }
+
+    /// Returns a distance before which none of some rays meets anything: where the stretches that can be jumped get
+    /// shorter than a share of the width of the rays. Nothing where they meet nothing at all.
+    #[inline(always)]
+    fn first_near(&self, field: &HeightField, rays: &[Local], start: f64, share: f64) -> Option<f64> {
+        let bounded = rays.iter().map(|r| (r.open, r.origin, r.direction, r.near, r.far));
+        let (pyramid, near, far) = Pyramid::around(bounded)?;
+        let mut begin = near.max(start);
+        let mut length = (far - begin) * 0.125;
+        // Rays that go all ways get no further than their longest: the loop ends, as the stretch is halved each time.
+        while begin < far {
+            let end = (begin + length).min(far);
+            if self.is_clear(field, &pyramid.between(begin, end)) {
+                begin = end;
+                length += length;
+            } else {
+                length *= 0.5;
+                if length <= share * pyramid.width(begin) || length <= 1e-6 * (far - near) {
+                    return Some(begin);
+                }
+            }
+        }
+        None
+    }
+
+    /// Tells whether a box is above or below all heights under it.
+    #[inline(always)]
+    fn is_clear(&self, field: &HeightField, part: &Aabb) -> bool {
+        let low = field.grid_from_plane(part.min.x, part.min.z);
+        let high = field.grid_from_plane(part.max.x, part.max.z);
+        let cells = (high - low).max_element();
+        let mut level = 0;
+        while level + 1 < self.levels.len() && cells > f64::from(2u32 << level) * (CELLS - 1) as f64 {
+            level += 1;
+        }
+        let size = f64::from(2u32 << level);
+        let at = &self.levels[level];
+        let inside = |v: f64, count: u32| (v / size).floor().clamp(0.0, f64::from(count - 1)) as u32;
+        let margin = 1e-9 * (part.min.y.abs() + part.max.y.abs());
+        for row in inside(low.y, at.rows)..=inside(high.y, at.rows) {
+            for column in inside(low.x, at.columns)..=inside(high.x, at.columns) {
+                let [lowest, highest] = at.range([column, row]).map(f64::from);
+                if part.min.y - margin <= highest && part.max.y + margin >= lowest {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Follows eight rays from a distance on, one by one.
+    #[inline(always)]
+    fn walk(&self, field: &HeightField, rays: &Local, start: f64, body: u32, hits: &mut Hits) {
+        for i in 0..LANES {
+            if !rays.open.has(i) {
                 continue;
             }
-            if !passes && let Some(hit) = ray.meet_patch(field.cell(cell[0], cell[1]), cell, t, exit) {
+            let (near, far) = (rays.near.0[i].max(start), rays.far.0[i]);
+            let ray = GridRay::new(field, rays.origin.get(i), rays.direction.get(i));
+            if let Some(t) = self.meet(field, &ray, near, far)
+                && t < hits.t.0[i]
+            {
+                (hits.t.0[i], hits.body.0[i]) = (t, body);
+            }
+        }
+    }
+
+    /// Finds the first distance in `[near, far]` at which a ray in object space meets the surface, from above or
+    /// from below.
+    #[inline(always)]
+    fn meet(&self, field: &HeightField, ray: &GridRay, near: f64, far: f64) -> Option<f64> {
+        if near > far {
+            return None;
+        }
+        let last = [field.columns() - 2, field.rows() - 2];
+        let mut level = FIRST_LEVEL.min(self.levels.len());
+        let (mut t, mut cell) = (near, ray.cell(near, level, last));
+        let mut y = ray.height + ray.rise * t;
+        // A hair of margin, so that rounding of `t` does not open a slit between cells.
+        let [lowest, highest] = [self.bounds.min.y, self.bounds.max.y];
+        let margin = 1e-12 * (lowest.abs() + highest.abs() + y.abs() + (ray.rise * far).abs());
+        loop {
+            let (across, along) = (ray.plane(cell, level, 0), ray.plane(cell, level, 1));
+            let (axis, border) = if along < across { (1, along) } else { (0, across) };
+            let exit = least(border, far);
+            let after = ray.height + ray.rise * exit;
+            let mut corners = [0.0; 4];
+            let [low, high] = if level > 0 {
+                self.levels[level - 1].range(cell).map(f64::from)
+            } else {
+                corners = field.cell(cell[0], cell[1]);
+                // All four: a bilinear patch stays between them.
+                let [a, b, c, d] = corners;
+                [least(least(a, b), least(c, d)), -least(least(-a, -b), least(-c, -d))]
+            };
+            let (bottom, top) = if ray.rise < 0.0 { (after, y) } else { (y, after) };
+            let passes = bottom > high + margin || top < low - margin;
+            if !passes && level > 0 {
+                level -= 1;
+                cell = ray.child(cell, level, t, last);
+                continue;
+            }
+            if !passes && let Some(hit) = ray.meet_patch(corners, cell, t, exit) {
                 return Some(hit);
             }
             if exit >= far {
                 return None;
             }
-            let axis;
-            (cell, axis) = ray.next(cell, level, &self.levels[level])?;
-            t = exit;
+            cell = ray.next(cell, axis, last[axis] >> level)?;
+            (t, y) = (exit, after);
             // Go up as long as the parent was entered just now, across the same plane: seen from there the
             // ray is never in doubt which child it is in.
-            while level + 1 < self.levels.len() && ray.enters_parent(cell, axis) {
+            while level < self.levels.len() && ray.enters_parent(cell, axis) {
                 level += 1;
                 cell = cell.map(|c| c / 2);
             }
@@ -106,9 +276,35 @@ impl HeightBody {
     }
 }
 
+/// Returns the smaller of two numbers.
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
 impl Level {
     fn range(&self, cell: [u32; 2]) -> [f32; 2] {
         self.ranges[(cell[1] * self.columns + cell[0]) as usize]
+    }
+
+    /// Bounds blocks of 2x2 cells: of up to 3x3 heights.
+    fn first(field: &HeightField) -> Self {
+        let [columns, rows] = [field.columns(), field.rows()].map(|n| (n - 1).div_ceil(2));
+        let heights = field.heights();
+        let mut ranges = Vec::with_capacity((columns * rows) as usize);
+        for row in 0..rows {
+            for column in 0..columns {
+                let mut range = [f32::INFINITY, f32::NEG_INFINITY];
+                for y in row * 2..(row * 2 + 3).min(field.rows()) {
+                    for x in column * 2..(column * 2 + 3).min(field.columns()) {
+                        let h = heights[(y * field.columns() + x) as usize];
+                        range = [range[0].min(h), range[1].max(h)];
+                    }
+                }
+                ranges.push(range);
+            }
+        }
+        Self { columns, rows, ranges }
     }
 
     fn halved(&self) -> Option<Self> {
@@ -137,43 +333,59 @@ impl Level {
 struct GridRay {
     start: DVec2,
     slope: DVec2,
+    /// One over the slopes.
+    pace: DVec2,
     height: f64,
     rise: f64,
 }
 
 impl GridRay {
-    /// Returns where the ray leaves a cell, from the planes of the cell alone.
-    fn exit(&self, cell: [u32; 2], level: usize, far: f64) -> f64 {
-        let axis = |i: usize| self.plane(cell, level, i).unwrap_or(f64::INFINITY);
-        axis(0).min(axis(1)).min(far)
+    #[inline(always)]
+    fn new(field: &HeightField, origin: DVec3, direction: DVec3) -> Self {
+        let slope = DVec2::new(direction.x, direction.z) / field.cell_size();
+        let start = field.grid_from_plane(origin.x, origin.z);
+        Self { start, slope, pace: slope.recip(), height: origin.y, rise: direction.y }
     }
 
-    /// Returns where the ray crosses the far plane of a cell along an axis.
-    fn plane(&self, cell: [u32; 2], level: usize, axis: usize) -> Option<f64> {
+    /// Returns the cell of a level that the ray is in at a distance; `last` is the last cell of the grid.
+    #[inline(always)]
+    fn cell(&self, t: f64, level: usize, last: [u32; 2]) -> [u32; 2] {
+        let mut cell = [0; 2];
+        for i in 0..2 {
+            let place = self.start[i] + self.slope[i] * t;
+            cell[i] = (if place > 0.0 { place as u32 } else { 0 }).min(last[i]) >> level;
+        }
+        cell
+    }
+
+    /// Returns where the ray crosses the far plane of a cell along an axis; infinity where it does not.
+    #[inline(always)]
+    fn plane(&self, cell: [u32; 2], level: usize, axis: usize) -> f64 {
         let slope = self.slope[axis];
-        let index = u64::from(cell[axis]) + u64::from(slope > 0.0);
-        (slope != 0.0).then(|| ((index << level) as f64 - self.start[axis]) / slope)
+        // Fewer than 2^31 cells: a field of as many heights as fit into memory has less along an edge.
+        let place = ((cell[axis] + u32::from(slope > 0.0)) << level) as i32;
+        let t = (f64::from(place) - self.start[axis]) * self.pace[axis];
+        if slope == 0.0 { f64::INFINITY } else { t }
     }
 
-    /// Returns the cell that follows, and the axis across which it is entered.
-    fn next(&self, cell: [u32; 2], level: usize, size: &Level) -> Option<([u32; 2], usize)> {
-        let along = |i: usize| self.plane(cell, level, i).unwrap_or(f64::INFINITY);
-        let axis = usize::from(along(1) < along(0));
-        let mut next = cell;
-        next[axis] =
-            if self.slope[axis] > 0.0 { cell[axis].checked_add(1)? } else { cell[axis].checked_sub(1)? };
-        (next[0] < size.columns && next[1] < size.rows).then_some((next, axis))
+    /// Returns the cell that follows along an axis.
+    #[inline(always)]
+    fn next(&self, mut cell: [u32; 2], axis: usize, last: u32) -> Option<[u32; 2]> {
+        let step = if self.slope[axis] > 0.0 { 1 } else { u32::MAX };
+        cell[axis] = cell[axis].wrapping_add(step);
+        (cell[axis] <= last).then_some(cell)
     }
 
     /// Returns which child of a cell the ray is in at `t`.
-    fn child(&self, cell: [u32; 2], level: usize, t: f64, size: &Level) -> [u32; 2] {
-        let last = [size.columns - 1, size.rows - 1];
-        std::array::from_fn(|i| {
-            let middle = ((u64::from(cell[i]) * 2 + 1) << level) as f64;
+    #[inline(always)]
+    fn child(&self, mut cell: [u32; 2], level: usize, t: f64, last: [u32; 2]) -> [u32; 2] {
+        for i in 0..2 {
+            let middle = f64::from(((cell[i] * 2 + 1) << level) as i32);
             let place = self.start[i] + self.slope[i] * t;
             let upper = if place == middle { self.slope[i] > 0.0 } else { place > middle };
-            (cell[i] * 2 + u32::from(upper)).min(last[i])
-        })
+            cell[i] = (cell[i] * 2 + u32::from(upper)).min(last[i] >> level);
+        }
+        cell
     }
 
     /// Tells whether the ray, having just entered a cell across an axis, entered its parent too.
@@ -236,7 +448,7 @@ mod tests {
             let steps = 60_000;
             let at = |k: i32| near + (far - near) * f64::from(k) / f64::from(steps);
             let first = (1..=steps).find(|&k| (above(at(k)) > 0.0) != (above(at(0)) > 0.0)).map(at);
-            let found = body.cast(&field, origin, direction, near, far);
+            let found = body.meet(&field, &GridRay::new(&field, origin, direction), near, far);
             hits += usize::from(first.is_some());
             wrong += usize::from(match (first, found) {
                 (Some(a), Some(b)) => (a - b).abs() > (far - near) * 1e-4,

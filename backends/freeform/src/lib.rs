@@ -3,10 +3,17 @@
 //!
 //! - [`Freeform`] draws primitives, free forms, height fields and volumes as given. Meshes and voxels are drawn
 //!   as the zero level of a grid of signed distances.
-//! - The rays of a tile are bounded together between two distances, which are halved while that is much longer than
-//!   the tile is wide; functions that cannot matter there are left out. A part that holds one quadric is solved in
-//!   closed form in double precision. Elsewhere roots are found by interval bounds along eight rays at once, so that
-//!   the first one is never missed except where a solid is thinner than a millionth of the stretch.
+//! - Tiles beside a body's box are left alone. The rays of a tile are bounded together between two distances, which are
+//!   halved while that is much longer than the tile is wide; functions that cannot matter there are left out. A part that
+//!   holds one quadric is solved in closed form in double precision. Elsewhere roots are found by interval bounds along
+//!   eight rays at once, so that the first one is never missed except where a solid is thinner than a millionth of the
+//!   stretch: in single precision around the middle of the part, with a bound on what rounding changes, and then a step
+//!   in double precision; or in double precision throughout (`roots.precision`). Perspective is taken by intervals along
+//!   the rays as they are, not by a projective form of the space: set up at the middle of each part they are as exact
+//!   for a far eye as for a near one.
+//! - Height fields are walked from where the rays of a tile, and then of its blocks, come near them.
+//! - Volumes: what is transparent is jumped without a change of the picture; where volumes overlap, their samples are
+//!   taken in the order of depth.
 //! - One sample a pixel, through its middle; mirrors are drawn as if they were not (and the report says so).
 //!
 //! Source: S. I. Vyatkin, *Complex surface modeling using perturbation functions*, Optoelectronics,
@@ -23,6 +30,8 @@ mod plan;
 mod program;
 mod renderer;
 mod roots;
+#[cfg(test)]
+mod truth;
 mod volume;
 mod world;
 

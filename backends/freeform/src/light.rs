@@ -1,8 +1,7 @@
 //! How much light leaves the points that the rays of a tile met, and which lights are blocked there?
 
 use crate::bundle::{Cone, Crossing, Hits, NOWHERE, OCTETS, Rays};
-use crate::form::FormScratch;
-use crate::world::{Points, World};
+use crate::world::{CastScratch, Points, World};
 use glam::DVec3;
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
 use polyptych_core::scene::{Light, LightKind};
@@ -50,7 +49,7 @@ impl<'a> Illumination<'a> {
         rays: &[Rays],
         hits: &[Hits],
         lit: &mut [Lit<'a>; OCTETS],
-        (scratch, form): (&mut Scratch, &mut FormScratch),
+        (scratch, form): (&mut Scratch, &mut CastScratch),
         traced: &mut u64,
     ) {
         let scene = &self.world.scene;
@@ -85,7 +84,7 @@ impl<'a> Illumination<'a> {
         is_blocked: bool,
         rays: &[Rays],
         lit: &mut [Lit<'_>; OCTETS],
-        (scratch, form): (&mut Scratch, &mut FormScratch),
+        (scratch, form): (&mut Scratch, &mut CastScratch),
         traced: &mut u64,
     ) {
         let mut arrivals = [Arrival::steady(light); OCTETS];
@@ -131,7 +130,7 @@ impl<'a> Illumination<'a> {
 
     /// Finds which shadow rays meet something opaque.
     #[inline(always)]
-    fn block(&self, scratch: &mut Scratch, form: &mut FormScratch) {
+    fn block(&self, scratch: &mut Scratch, form: &mut CastScratch) {
         let Some(cone) = Cone::around(&scratch.rays).map_or(
             // Rays that go all ways, or none at all.
             scratch.rays.iter().any(|r| r.open().any()).then_some(None),

@@ -1,6 +1,6 @@
 //! A free form as a list of steps for a stack machine, and which of them matter in a part of space.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use polyptych_core::lanes::{DVec3x8, F64x8};
 use polyptych_core::math::{Aabb, Interval};
 use polyptych_core::scene::{Form, Perturbation, Power, Quadric};
@@ -35,6 +35,8 @@ pub(crate) enum Step {
 pub(crate) struct Program {
     pub(crate) steps: Vec<Step>,
     pub(crate) leaves: Vec<Quadric>,
+    /// Where each leaf may be positive; everywhere unless it is an ellipsoid.
+    pub(crate) supports: Vec<Aabb>,
     /// Most values on the stack at once.
     pub(crate) depth: usize,
 }
@@ -58,6 +60,7 @@ impl Program {
     fn leaf(&mut self, quadric: Quadric) {
         self.steps.push(Step::Leaf(self.leaves.len() as u32));
         self.leaves.push(quadric);
+        self.supports.push(support(&quadric));
     }
 
     fn push(&mut self, form: &Form) {
@@ -154,7 +157,9 @@ impl Active {
                     }
                 }
                 Step::Bump { leaf, weight, power } => {
-                    self.add(program.leaves[leaf as usize].interval(part), weight, power, step);
+                    if !program.supports[leaf as usize].intersection(*part).is_empty() {
+                        self.add(program.leaves[leaf as usize].interval(part), weight, power, step);
+                    }
                 }
                 Step::Max => self.select(step, |a, b| a.lo >= b.hi, Interval::max),
                 Step::Min => self.select(step, |a, b| a.hi <= b.lo, Interval::min),
@@ -210,6 +215,32 @@ impl Active {
             self.stack.push((a_begin, both(a, b)));
         }
     }
+}
+
+/// Bounds where a quadric is positive: `v - (p - m)^T M (p - m)` with a positive definite `M` reaches
+/// `sqrt(v (M^-1)_ii)` from its middle along axis `i`. Others reach everywhere.
+fn support(quadric: &Quadric) -> Aabb {
+    let everywhere = Aabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
+    let [a, b, c, d, e, f, ..] = quadric.0;
+    let (d, e, f) = (0.5 * d, 0.5 * e, 0.5 * f);
+    let bend = DMat3::from_cols(DVec3::new(-a, -d, -e), DVec3::new(-d, -b, -f), DVec3::new(-e, -f, -c));
+    let minors = [-a, a * b - d * d, bend.determinant()];
+    let scale = DVec3::new(a, b, c).abs().max_element();
+    // Nearly flat ones are left alone: their inverse is rounded too much.
+    let round = [1.0, scale, scale * scale].map(|s| 1e-6 * s * scale);
+    if (0..3).any(|i| minors[i].is_nan() || minors[i] <= round[i]) {
+        return everywhere;
+    }
+    let inverse = bend.inverse();
+    let middle = inverse * quadric.gradient(DVec3::ZERO) * 0.5;
+    let top = quadric.value(middle);
+    let reach = |spread: f64| (top.max(0.0) * spread).sqrt();
+    let half = DVec3::new(reach(inverse.x_axis.x), reach(inverse.y_axis.y), reach(inverse.z_axis.z));
+    // The value at the middle was rounded in terms as large as these.
+    let size = quadric.0[9].abs() + middle.abs().dot(bend.abs() * middle.abs());
+    let slack = (size * 1e-12 * inverse.x_axis.x.max(inverse.y_axis.y).max(inverse.z_axis.z)).sqrt();
+    let all = Aabb::new(middle - half, middle + half).grown(half.max_element() * 1e-6 + slack);
+    if all.min.is_finite() && all.max.is_finite() { all } else { everywhere }
 }
 
 fn smooth(a: Interval, b: Interval, k: f64) -> Interval {

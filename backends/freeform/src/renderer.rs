@@ -1,7 +1,8 @@
 //! The seam: what is prepared and kept, and one frame of it.
 
 use crate::bundle::TILE;
-use crate::frame::{FrameDrawing, Options, Scratch};
+use crate::form::Precision;
+use crate::frame::{FrameDrawing, Scratch};
 use crate::plan::plan;
 use crate::world::{Body, Geometry, World};
 use polyptych_core::convert::{Converter, Detail};
@@ -55,6 +56,15 @@ fn info() -> BackendInfo {
                 quality_axis: true,
             },
             Parameter {
+                name: "roots.precision",
+                kind: ParameterKind::Choice { choices: &["single", "double"] },
+                default: Value::Text("single".to_owned()),
+                unit: "",
+                help: "numbers in which roots of free forms are searched for; both end with a step in double precision",
+                tag: "precision",
+                quality_axis: true,
+            },
+            Parameter {
                 name: "shadow",
                 kind: ParameterKind::Bool,
                 default: Value::Bool(true),
@@ -73,7 +83,8 @@ pub struct Freeform {
     /// What was built of each shape, under the address of the shape, which is kept alive.
     kept: HashMap<usize, (Arc<Shape>, Arc<Geometry>)>,
     world: Option<World>,
-    options: Options,
+    /// Step through volumes in units of their smallest spacing.
+    volume_step: f64,
     scratch: Vec<Mutex<Scratch>>,
     bytes: u64,
 }
@@ -92,7 +103,7 @@ impl Freeform {
             info: info(),
             kept: HashMap::new(),
             world: None,
-            options: Options { volume_step: 0.5 },
+            volume_step: 0.5,
             scratch: Vec::new(),
             bytes: 0,
         }
@@ -121,7 +132,7 @@ impl Freeform {
         if let Some((_, geometry)) = self.kept.get(&key) {
             return Ok((geometry.clone(), Decision::Exact));
         }
-        if let Some(geometry) = Geometry::of(&object.shape) {
+        if let Some(geometry) = Geometry::of(&object.shape, self.volume_step) {
             let geometry = Arc::new(geometry);
             self.kept.insert(key, (object.shape.clone(), geometry.clone()));
             return Ok((geometry, Decision::Exact));
@@ -176,9 +187,19 @@ impl Renderer for Freeform {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
-        self.options = Options { volume_step: need.settings.float(&self.info.parameters, "volume.step") };
+        let volume_step = need.settings.float(&self.info.parameters, "volume.step");
+        let precision = match need.settings.text(&self.info.parameters, "roots.precision") {
+            "double" => Precision::Double,
+            _ => Precision::Single,
+        };
+        if volume_step != self.volume_step {
+            // Opacities are kept for samples so far apart.
+            self.kept.retain(|_, (_, geometry)| !matches!(**geometry, Geometry::Volume(_)));
+            self.volume_step = volume_step;
+        }
         // Shapes that are gone from the scene are let go.
         self.kept.retain(|_, (shape, _)| scene.objects.iter().any(|o| Arc::ptr_eq(&o.shape, shape)));
+        let lights = scene.all_lights();
         let mut bodies = Vec::new();
         let mut decisions = Vec::with_capacity(scene.objects.len());
         for (index, object) in scene.objects.iter().enumerate() {
@@ -189,7 +210,7 @@ impl Renderer for Freeform {
             };
             decisions.push(match built {
                 Ok((geometry, decision)) => {
-                    bodies.push(Body::new(scene, index, object, geometry));
+                    bodies.push(Body::new((scene, &lights, precision), index, object, geometry));
                     with_material(scene, object, decision)
                 }
                 Err(reason) if object.required => {
@@ -202,7 +223,6 @@ impl Renderer for Freeform {
         let own = bodies.iter().filter(|b| seen.insert(Arc::as_ptr(&b.geometry)));
         self.bytes = own.map(|b| b.geometry.bytes()).sum();
         let decisions: Arc<[Decision]> = decisions.into();
-        let lights = scene.all_lights();
         // A frame may ask for more channels than were needed: rays toward lights must know their way all the same.
         let all = Need { channels: need.channels.with(Channel::Color), ..need.clone() };
         let demand = self.demand(scene, &all, &lights);
@@ -228,7 +248,6 @@ impl Renderer for Freeform {
             world,
             view: frame.camera.view(target.width(), target.height()),
             channels: target.channels(),
-            options: self.options,
         };
         let bands = target.height().div_ceil(TILE) as usize;
         if self.scratch.len() < bands {

@@ -7,91 +7,151 @@
 //! [`FINEST`] of the stretch.
 
 use crate::bundle::Crossing;
-use crate::form::Parabola;
 use crate::program::Step;
 use polyptych_core::lanes::{F32x8, F64x8, LANES, Mask8};
 use polyptych_core::scene::Power;
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Shortest stretch that is still halved, as a share of the whole: the resolution of single precision.
-const FINEST: f32 = 1.0 / (1 << 20) as f32;
+/// Eight numbers in single or double precision.
+pub(crate) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// Shortest stretch that is still halved, as a share of the whole: about the resolution of the precision.
+    const FINEST: f64;
+    /// Rounding error of an operation with a little more.
+    const ROUNDING: f64;
+    const ZERO: Self;
+    fn number(value: f64) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    fn above(self, other: Self) -> Mask8;
+    fn at_least(self, other: Self) -> Mask8;
+    fn pick(mask: Mask8, yes: Self, no: Self) -> Self;
+}
 
-/// Rounding error of an operation with a little more: 2^-22.
-const ROUNDING: f32 = 1.0 / (1 << 22) as f32;
+macro_rules! number {
+    ($lanes:ident, $finest:expr, $rounding:expr, $number:expr, $pick:expr) => {
+        impl Number for $lanes {
+            const FINEST: f64 = 1.0 / (1u64 << $finest) as f64;
+            const ROUNDING: f64 = 1.0 / (1u64 << $rounding) as f64;
+            const ZERO: Self = $lanes::ZERO;
+            #[inline(always)]
+            fn number(value: f64) -> Self {
+                $number(value)
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                $lanes::min(self, other)
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                $lanes::max(self, other)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $lanes::abs(self)
+            }
+            #[inline(always)]
+            fn above(self, other: Self) -> Mask8 {
+                $lanes::above(self, other)
+            }
+            #[inline(always)]
+            fn at_least(self, other: Self) -> Mask8 {
+                $lanes::at_least(self, other)
+            }
+            #[inline(always)]
+            fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
+                $pick(mask, yes, no)
+            }
+        }
+    };
+}
+number!(F32x8, 20, 22, |v| F32x8::splat(v as f32), |m: Mask8, yes, no| m.pick(yes, no));
+number!(F64x8, 40, 51, F64x8::splat, F64x8::pick);
 
 /// A quadric along eight rays: `a u^2 + b u + c`, with a bound on the rounding error over the whole stretch.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RayQuadric {
-    pub(crate) a: F32x8,
-    pub(crate) b: F32x8,
-    pub(crate) c: F32x8,
-    pub(crate) error: F32x8,
+pub(crate) struct RayQuadric<N> {
+    pub(crate) a: N,
+    pub(crate) b: N,
+    pub(crate) c: N,
+    pub(crate) error: N,
 }
 
 /// Bounds of a function and its derivative over a stretch.
 #[derive(Clone, Copy, Debug)]
-struct Range {
-    lo: F32x8,
-    hi: F32x8,
-    slope_lo: F32x8,
-    slope_hi: F32x8,
+struct Range<N> {
+    lo: N,
+    hi: N,
+    slope_lo: N,
+    slope_hi: N,
 }
 
-impl RayQuadric {
-    /// Rounds a quadric along rays that is looked at up to `reach` from their points.
+impl<N: Number> RayQuadric<N> {
+    pub(crate) const ZERO: Self = Self { a: N::ZERO, b: N::ZERO, c: N::ZERO, error: N::ZERO };
+
+    /// Tells where it is not zero up to `reach` from the points.
     #[inline(always)]
-    pub(crate) fn new(along: &Parabola, reach: F64x8) -> Self {
-        let Parabola { a, b, c } = *along;
-        // Three roundings of single precision on each term, doubled.
-        let error =
-            ((a.abs() * reach + b.abs()) * reach + c.abs()) * F64x8::splat(6.0 * f64::from(f32::EPSILON));
-        Self { a: a.round(), b: b.round(), c: c.round(), error: error.round() }
+    pub(crate) fn is_nowhere_zero(&self, reach: N) -> Mask8 {
+        let range = leaf_range(self, -reach, reach);
+        range.lo.above(N::ZERO) | N::ZERO.above(range.hi)
     }
 
-    pub(crate) const ZERO: Self = Self { a: F32x8::ZERO, b: F32x8::ZERO, c: F32x8::ZERO, error: F32x8::ZERO };
+    /// Tells where it is nowhere positive up to `reach` from the points.
+    #[inline(always)]
+    pub(crate) fn is_nothing(&self, reach: N) -> Mask8 {
+        let top = leaf_range(self, -reach, reach).hi;
+        N::ZERO.at_least(top)
+    }
 }
 
-impl Range {
-    const ZERO: Self =
-        Self { lo: F32x8::ZERO, hi: F32x8::ZERO, slope_lo: F32x8::ZERO, slope_hi: F32x8::ZERO };
+impl<N: Number> Range<N> {
+    const ZERO: Self = Self { lo: N::ZERO, hi: N::ZERO, slope_lo: N::ZERO, slope_hi: N::ZERO };
 }
 
 /// Scratch memory of one worker.
-#[derive(Default)]
-pub(crate) struct Stack {
-    ranges: Vec<Range>,
-    values: Vec<(F32x8, F32x8)>,
+pub(crate) struct Stack<N> {
+    ranges: Vec<Range<N>>,
+    values: Vec<(N, N)>,
+}
+
+impl<N> Default for Stack<N> {
+    fn default() -> Self {
+        Self { ranges: Vec::new(), values: Vec::new() }
+    }
 }
 
 /// Finds the first root of each active ray in `[from, to]`. Returns which rays have one, and where.
 #[inline(always)]
-pub(crate) fn first_roots(
+pub(crate) fn first_roots<N: Number>(
     steps: &[Step],
-    leaves: &[RayQuadric],
-    from: F32x8,
-    to: F32x8,
+    leaves: &[RayQuadric<N>],
+    from: N,
+    to: N,
     active: Mask8,
     crossing: Crossing,
-    stack: &mut Stack,
-) -> (Mask8, F32x8) {
-    let half = F32x8::splat(0.5);
-    let shortest = (to - from) * F32x8::splat(FINEST);
+    stack: &mut Stack<N>,
+) -> (Mask8, N) {
+    let half = N::number(0.5);
+    let shortest = (to - from) * N::number(N::FINEST);
     let mut begin = from;
     let mut length = to - from;
     let mut open = active & to.at_least(from);
-    let (mut hit, mut root) = (Mask8::NONE, F32x8::ZERO);
+    let (mut hit, mut root) = (Mask8::NONE, N::ZERO);
     while open.any() {
         let end = (begin + length).min(to);
         let range = bound(steps, leaves, begin, end, &mut stack.ranges);
-        let excluded = (range.lo.above(F32x8::ZERO) | (-range.hi).above(F32x8::ZERO)) & open;
-        let monotone = range.slope_lo.above(F32x8::ZERO) | (-range.slope_hi).above(F32x8::ZERO);
+        let excluded = (range.lo.above(N::ZERO) | (-range.hi).above(N::ZERO)) & open;
+        let monotone = range.slope_lo.above(N::ZERO) | (-range.slope_hi).above(N::ZERO);
         let tiny = shortest.at_least(length);
         let search = (monotone | tiny) & open & !excluded;
         let mut passed = excluded;
         if search.any() {
             let (at_begin, _) = value(steps, leaves, begin, &mut stack.values);
             let (at_end, _) = value(steps, leaves, end, &mut stack.values);
-            let inside = at_begin.at_least(F32x8::ZERO);
-            let ends_inside = at_end.at_least(F32x8::ZERO);
+            let inside = at_begin.at_least(N::ZERO);
+            let ends_inside = at_end.at_least(N::ZERO);
             let change = match crossing {
                 Crossing::Any => (inside & !ends_inside) | (!inside & ends_inside),
                 Crossing::Entry => !inside & ends_inside,
@@ -103,43 +163,43 @@ pub(crate) fn first_roots(
                     // What blocks light does so wherever it is.
                     Crossing::Entry => begin,
                 };
-                root = found.pick(refined, root);
+                root = N::pick(found, refined, root);
                 hit = hit | found;
                 open = open & !found;
             }
             passed = passed | (search & !change);
         }
         open = open & !(passed & end.at_least(to));
-        begin = passed.pick(end, begin);
-        length = passed.pick(length + length, length * half);
+        begin = N::pick(passed, end, begin);
+        length = N::pick(passed, length + length, length * half);
     }
     (hit, root)
 }
 
 /// Closes in on a root by Newton's method, by bisection where a step would leave the bracket.
 #[inline(always)]
-fn refine(
+fn refine<N: Number>(
     steps: &[Step],
-    leaves: &[RayQuadric],
-    mut lo: F32x8,
-    mut hi: F32x8,
+    leaves: &[RayQuadric<N>],
+    mut lo: N,
+    mut hi: N,
     wanted: Mask8,
     inside_at_lo: Mask8,
-    values: &mut Vec<(F32x8, F32x8)>,
-) -> F32x8 {
-    let half = F32x8::splat(0.5);
+    values: &mut Vec<(N, N)>,
+) -> N {
+    let half = N::number(0.5);
     // The next step of Newton's method squares what is left of a share of the bracket.
-    let close = (hi - lo) * F32x8::splat(1e-4);
+    let close = (hi - lo) * N::number(1e-4);
     let mut u = (lo + hi) * half;
     for _ in 0..7 {
         let (f, slope) = value(steps, leaves, u, values);
-        let inside = f.at_least(F32x8::ZERO);
+        let inside = f.at_least(N::ZERO);
         let same = (inside & inside_at_lo) | (!inside & !inside_at_lo);
-        lo = same.pick(u, lo);
-        hi = same.pick(hi, u);
+        lo = N::pick(same, u, lo);
+        hi = N::pick(same, hi, u);
         let newton = u - f / slope;
         let within = newton.at_least(lo) & hi.at_least(newton);
-        let next = within.pick(newton, (lo + hi) * half);
+        let next = N::pick(within, newton, (lo + hi) * half);
         let moved = (next - u).abs().above(close) & wanted;
         u = next;
         if !moved.any() {
@@ -151,15 +211,15 @@ fn refine(
 
 /// Evaluates the form and its derivative along the rays.
 #[inline(always)]
-fn value(steps: &[Step], leaves: &[RayQuadric], u: F32x8, stack: &mut Vec<(F32x8, F32x8)>) -> (F32x8, F32x8) {
+fn value<N: Number>(steps: &[Step], leaves: &[RayQuadric<N>], u: N, stack: &mut Vec<(N, N)>) -> (N, N) {
     let quadric = |leaf: u32| {
         let q = &leaves[leaf as usize];
         ((q.a * u + q.b) * u + q.c, (q.a + q.a) * u + q.b)
     };
-    let number = |value: f64| F32x8::splat(value as f32);
+    let number = N::number;
     stack.clear();
     // The top of the stack.
-    let (mut b, mut db) = (F32x8::splat(-1.0), F32x8::ZERO);
+    let (mut b, mut db) = (N::number(-1.0), N::ZERO);
     for (i, &step) in steps.iter().enumerate() {
         match step {
             Step::Leaf(leaf) => {
@@ -192,17 +252,17 @@ fn value(steps: &[Step], leaves: &[RayQuadric], u: F32x8, stack: &mut Vec<(F32x8
             }
             Step::Max => {
                 let first = a.at_least(b);
-                (first.pick(a, b), first.pick(da, db))
+                (N::pick(first, a, b), N::pick(first, da, db))
             }
             Step::Min => {
                 let first = b.at_least(a);
-                (first.pick(a, b), first.pick(da, db))
+                (N::pick(first, a, b), N::pick(first, da, db))
             }
             Step::Smooth(k) => {
                 let first = a.at_least(b);
-                let (top, low) = (first.pick(a, b), first.pick(b, a));
-                let (dtop, dlow) = (first.pick(da, db), first.pick(db, da));
-                let overlap = (number(k) - (top - low)).max(F32x8::ZERO);
+                let (top, low) = (N::pick(first, a, b), N::pick(first, b, a));
+                let (dtop, dlow) = (N::pick(first, da, db), N::pick(first, db, da));
+                let overlap = (number(k) - (top - low)).max(N::ZERO);
                 let share = overlap * number(0.5 / k);
                 (top + overlap * overlap * number(0.25 / k), dtop + (dlow - dtop) * share)
             }
@@ -222,23 +282,29 @@ fn value(steps: &[Step], leaves: &[RayQuadric], u: F32x8, stack: &mut Vec<(F32x8
 
 /// Returns `weight * R(q)` and its derivative.
 #[inline(always)]
-fn raised((q, dq): (F32x8, F32x8), weight: f64, power: Power) -> (F32x8, F32x8) {
-    let (q, w) = (q.max(F32x8::ZERO), F32x8::splat(weight as f32));
+fn raised<N: Number>((q, dq): (N, N), weight: f64, power: Power) -> (N, N) {
+    let (q, w) = (q.max(N::ZERO), N::number(weight));
     match power {
         Power::Square => (w * (q * q), w * (q + q) * dq),
         Power::Cube => {
             let q2 = q * q;
-            (w * (q2 * q), w * (F32x8::splat(3.0) * q2) * dq)
+            (w * (q2 * q), w * (N::number(3.0) * q2) * dq)
         }
     }
 }
 
 /// Bounds the form and its derivative over `[u0, u1]`.
 #[inline(always)]
-fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mut Vec<Range>) -> Range {
+fn bound<N: Number>(
+    steps: &[Step],
+    leaves: &[RayQuadric<N>],
+    u0: N,
+    u1: N,
+    stack: &mut Vec<Range<N>>,
+) -> Range<N> {
     stack.clear();
     // The top of the stack.
-    let mut b = Range { lo: F32x8::splat(-1.0), hi: F32x8::splat(-1.0), ..Range::ZERO };
+    let mut b = Range { lo: N::number(-1.0), hi: N::number(-1.0), ..Range::ZERO };
     for (i, &step) in steps.iter().enumerate() {
         match step {
             Step::Leaf(leaf) => {
@@ -250,8 +316,8 @@ fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mu
             }
             Step::Bump { leaf, weight, power } => {
                 let q = leaf_range(&leaves[leaf as usize], u0, u1);
-                if q.hi.above(F32x8::ZERO).any() {
-                    b = widened(term_range(b, q, weight as f32, power));
+                if q.hi.above(N::ZERO).any() {
+                    b = widened(term_range(b, q, weight, power));
                 }
                 continue;
             }
@@ -260,7 +326,7 @@ fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mu
                 continue;
             }
             Step::Add(c) => {
-                let c = F32x8::splat(c as f32);
+                let c = N::number(c);
                 b = widened(Range { lo: b.lo + c, hi: b.hi + c, ..b });
                 continue;
             }
@@ -268,17 +334,17 @@ fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mu
         }
         let Some(a) = stack.pop() else { break };
         b = widened(match step {
-            Step::Term { weight, power } => term_range(a, b, weight as f32, power),
+            Step::Term { weight, power } => term_range(a, b, weight, power),
             Step::Max => max_range(a, b),
             Step::Min => flipped(max_range(flipped(a), flipped(b))),
-            Step::Smooth(k) => smooth_range(a, b, k as f32),
-            Step::Mix(t) => sum(scaled(a, (1.0 - t) as f32), scaled(b, t as f32)),
+            Step::Smooth(k) => smooth_range(a, b, k),
+            Step::Mix(t) => sum(scaled(a, 1.0 - t), scaled(b, t)),
             Step::Torus(ring) => {
                 let (s_lo, s_hi) = square(b.lo, b.hi);
                 let (p_lo, p_hi) = product(b.lo, b.hi, b.slope_lo, b.slope_hi);
-                let two = F32x8::splat(-2.0);
+                let two = N::number(-2.0);
                 let minus = Range { lo: -s_hi, hi: -s_lo, slope_lo: p_hi * two, slope_hi: p_lo * two };
-                sum(scaled(a, ring as f32), minus)
+                sum(scaled(a, ring), minus)
             }
             Step::Leaf(_) | Step::Bump { .. } | Step::Neg | Step::Add(_) => b,
         });
@@ -287,22 +353,22 @@ fn bound(steps: &[Step], leaves: &[RayQuadric], u0: F32x8, u1: F32x8, stack: &mu
 }
 
 #[inline(always)]
-fn flipped(r: Range) -> Range {
+fn flipped<N: Number>(r: Range<N>) -> Range<N> {
     Range { lo: -r.hi, hi: -r.lo, slope_lo: -r.slope_hi, slope_hi: -r.slope_lo }
 }
 
 /// Bounds a parabola exactly: by its ends, and its vertex where that lies between.
 #[inline(always)]
-fn leaf_range(q: &RayQuadric, u0: F32x8, u1: F32x8) -> Range {
-    let at = |u: F32x8| (q.a * u + q.b) * u + q.c;
+fn leaf_range<N: Number>(q: &RayQuadric<N>, u0: N, u1: N) -> Range<N> {
+    let at = |u: N| (q.a * u + q.b) * u + q.c;
     let (f0, f1) = (at(u0), at(u1));
     let (slope0, slope1) = ((q.a + q.a) * u0 + q.b, (q.a + q.a) * u1 + q.b);
-    let turns = (-(slope0 * slope1)).above(F32x8::ZERO);
-    let vertex = q.c - (q.b * q.b) / (q.a * F32x8::splat(4.0));
+    let turns = (-(slope0 * slope1)).above(N::ZERO);
+    let vertex = q.c - (q.b * q.b) / (q.a * N::number(4.0));
     let (mut lo, mut hi) = (f0.min(f1), f0.max(f1));
-    lo = turns.pick(lo.min(vertex), lo);
-    hi = turns.pick(hi.max(vertex), hi);
-    let slope_error = (slope0.abs() + slope1.abs() + q.b.abs()) * F32x8::splat(ROUNDING);
+    lo = N::pick(turns, lo.min(vertex), lo);
+    hi = N::pick(turns, hi.max(vertex), hi);
+    let slope_error = (slope0.abs() + slope1.abs() + q.b.abs()) * N::number(N::ROUNDING);
     Range {
         lo: lo - q.error,
         hi: hi + q.error,
@@ -312,8 +378,8 @@ fn leaf_range(q: &RayQuadric, u0: F32x8, u1: F32x8) -> Range {
 }
 
 #[inline(always)]
-fn widened(r: Range) -> Range {
-    let e = F32x8::splat(ROUNDING);
+fn widened<N: Number>(r: Range<N>) -> Range<N> {
+    let e = N::number(N::ROUNDING);
     Range {
         lo: r.lo - r.lo.abs() * e,
         hi: r.hi + r.hi.abs() * e,
@@ -323,21 +389,21 @@ fn widened(r: Range) -> Range {
 }
 
 #[inline(always)]
-fn square(lo: F32x8, hi: F32x8) -> (F32x8, F32x8) {
+fn square<N: Number>(lo: N, hi: N) -> (N, N) {
     let (a, b) = (lo * lo, hi * hi);
-    let holds_zero = F32x8::ZERO.at_least(lo) & hi.at_least(F32x8::ZERO);
-    (holds_zero.pick(F32x8::ZERO, a.min(b)), a.max(b))
+    let holds_zero = N::ZERO.at_least(lo) & hi.at_least(N::ZERO);
+    (N::pick(holds_zero, N::ZERO, a.min(b)), a.max(b))
 }
 
 #[inline(always)]
-fn product(a_lo: F32x8, a_hi: F32x8, b_lo: F32x8, b_hi: F32x8) -> (F32x8, F32x8) {
+fn product<N: Number>(a_lo: N, a_hi: N, b_lo: N, b_hi: N) -> (N, N) {
     let (p, q, r, s) = (a_lo * b_lo, a_lo * b_hi, a_hi * b_lo, a_hi * b_hi);
     (p.min(q).min(r.min(s)), p.max(q).max(r.max(s)))
 }
 
 #[inline(always)]
-fn scaled(r: Range, factor: f32) -> Range {
-    let f = F32x8::splat(factor);
+fn scaled<N: Number>(r: Range<N>, factor: f64) -> Range<N> {
+    let f = N::number(factor);
     if factor >= 0.0 {
         Range { lo: r.lo * f, hi: r.hi * f, slope_lo: r.slope_lo * f, slope_hi: r.slope_hi * f }
     } else {
@@ -346,9 +412,9 @@ fn scaled(r: Range, factor: f32) -> Range {
 }
 
 #[inline(always)]
-fn sum(a: Range, b: Range) -> Range {
+fn sum<N: Number>(a: Range<N>, b: Range<N>) -> Range<N> {
     // The sum may cancel: allow for the rounding of its parts.
-    let e = F32x8::splat(ROUNDING);
+    let e = N::number(N::ROUNDING);
     let lost = (a.lo.abs().max(a.hi.abs()) + b.lo.abs().max(b.hi.abs())) * e;
     let slope_lost = (a.slope_lo.abs().max(a.slope_hi.abs()) + b.slope_lo.abs().max(b.slope_hi.abs())) * e;
     Range {
@@ -360,13 +426,13 @@ fn sum(a: Range, b: Range) -> Range {
 }
 
 #[inline(always)]
-fn term_range(base: Range, q: Range, weight: f32, power: Power) -> Range {
-    let (lo, hi) = (q.lo.max(F32x8::ZERO), q.hi.max(F32x8::ZERO));
+fn term_range<N: Number>(base: Range<N>, q: Range<N>, weight: f64, power: Power) -> Range<N> {
+    let (lo, hi) = (q.lo.max(N::ZERO), q.hi.max(N::ZERO));
     let (raised_lo, raised_hi, outer_lo, outer_hi) = match power {
         Power::Square => (lo * lo, hi * hi, lo + lo, hi + hi),
         Power::Cube => {
             let (l2, h2) = (lo * lo, hi * hi);
-            (l2 * lo, h2 * hi, l2 * F32x8::splat(3.0), h2 * F32x8::splat(3.0))
+            (l2 * lo, h2 * hi, l2 * N::number(3.0), h2 * N::number(3.0))
         }
     };
     let (slope_lo, slope_hi) = product(outer_lo, outer_hi, q.slope_lo, q.slope_hi);
@@ -374,32 +440,32 @@ fn term_range(base: Range, q: Range, weight: f32, power: Power) -> Range {
 }
 
 #[inline(always)]
-fn max_range(a: Range, b: Range) -> Range {
+fn max_range<N: Number>(a: Range<N>, b: Range<N>) -> Range<N> {
     // Where one is larger everywhere, the slope is its own; else either's.
     let (only_a, only_b) = (a.lo.above(b.hi), b.lo.above(a.hi));
-    let lo = only_b.pick(b.slope_lo, only_a.pick(a.slope_lo, a.slope_lo.min(b.slope_lo)));
-    let hi = only_b.pick(b.slope_hi, only_a.pick(a.slope_hi, a.slope_hi.max(b.slope_hi)));
+    let lo = N::pick(only_b, b.slope_lo, N::pick(only_a, a.slope_lo, a.slope_lo.min(b.slope_lo)));
+    let hi = N::pick(only_b, b.slope_hi, N::pick(only_a, a.slope_hi, a.slope_hi.max(b.slope_hi)));
     Range { lo: a.lo.max(b.lo), hi: a.hi.max(b.hi), slope_lo: lo, slope_hi: hi }
 }
 
 #[inline(always)]
-fn smooth_range(a: Range, b: Range, k: f32) -> Range {
+fn smooth_range<N: Number>(a: Range<N>, b: Range<N>, k: f64) -> Range<N> {
     let (gap_lo, gap_hi) = (a.lo - b.hi, a.hi - b.lo);
     let (n, f) = (gap_lo.abs().min(gap_hi.abs()), gap_lo.abs().max(gap_hi.abs()));
-    let crossing = F32x8::ZERO.at_least(gap_lo) & gap_hi.at_least(F32x8::ZERO);
-    let nearest = crossing.pick(F32x8::ZERO, n);
-    let fillet = |gap: F32x8| {
-        let overlap = (F32x8::splat(k) - gap).max(F32x8::ZERO);
-        overlap * overlap * F32x8::splat(0.25 / k)
+    let crossing = N::ZERO.at_least(gap_lo) & gap_hi.at_least(N::ZERO);
+    let nearest = N::pick(crossing, N::ZERO, n);
+    let fillet = |gap: N| {
+        let overlap = (N::number(k) - gap).max(N::ZERO);
+        overlap * overlap * N::number(0.25 / k)
     };
     let top = max_range(a, b);
     // The slope is a mix of both slopes wherever the fillet reaches.
-    let mixes = F32x8::splat(k).at_least(nearest);
+    let mixes = N::number(k).at_least(nearest);
     Range {
         lo: top.lo + fillet(f),
         hi: top.hi + fillet(nearest),
-        slope_lo: mixes.pick(a.slope_lo.min(b.slope_lo), top.slope_lo),
-        slope_hi: mixes.pick(a.slope_hi.max(b.slope_hi), top.slope_hi),
+        slope_lo: N::pick(mixes, a.slope_lo.min(b.slope_lo), top.slope_lo),
+        slope_hi: N::pick(mixes, a.slope_hi.max(b.slope_hi), top.slope_hi),
     }
 }
 
@@ -418,39 +484,41 @@ mod tests {
         (*state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
     }
 
-    /// Casts rays through the figure that uses every step and compares with dense sampling in f64.
+    /// Bounds the figure that uses every step over a million random stretches of rays and looks into them.
     #[test]
-    fn first_roots_agree_with_dense_sampling() {
+    fn bounds_hold_the_values_in_double_precision() {
         let form = everything();
         let program = Program::new(&form);
-        let mut stack = Stack::default();
+        let mut ranges = Vec::new();
         let mut state = 5;
-        let (mut hits, mut wrong) = (0, 0);
-        for _ in 0..24 {
-            let mut point = || DVec3::new(random(&mut state), random(&mut state), random(&mut state));
+        let (mut outside, mut narrow) = (0, 0);
+        for _ in 0..15_625 {
+            let mut number = || random(&mut state);
+            let middle = DVec3::new(number(), number(), number()) * 1.5;
+            let size = 0.02 + number().abs();
             let rays: [(DVec3, DVec3); LANES] = std::array::from_fn(|_| {
-                let origin = point().normalize_or(DVec3::X) * 3.0;
-                (origin, (point() - origin).normalize_or(DVec3::X))
+                let mut point = || DVec3::new(number(), number(), number());
+                let (near, toward) = (middle + point() * (size * 0.3), point().normalize_or(DVec3::X));
+                (near - toward * 3.0, toward)
             });
-            let leaves = crate::form::tests::along(&program, &rays, 3.0, 3.0);
-            let (from, to) = (F32x8::splat(-3.0), F32x8::splat(3.0));
-            let (hit, root) =
-                first_roots(&program.steps, &leaves, from, to, Mask8::ALL, Crossing::Any, &mut stack);
+            let reach = size * 0.4;
+            let leaves = crate::form::tests::along(&program, &rays, (3.0, reach), (middle, size.max(0.3)));
+            let (from, to) = (number() * reach, number() * reach);
+            let (from, to) = (from.min(to) as f32, from.max(to) as f32);
+            let ends = (F32x8::splat(from), F32x8::splat(to));
+            let range = bound(&program.steps, &leaves, ends.0, ends.1, &mut ranges);
             for (lane, &(o, d)) in rays.iter().enumerate() {
-                let steps = 20_000;
-                let at = |i: i32| form.value(o + d * (6.0 * f64::from(i) / f64::from(steps)));
-                let first = (1..=steps)
-                    .find(|&i| (at(i) >= 0.0) != (at(0) >= 0.0))
-                    .map(|i| 6.0 * f64::from(i) / f64::from(steps));
-                let found = hit.has(lane).then(|| 3.0 + f64::from(root.0[lane]));
-                hits += usize::from(first.is_some());
-                wrong += usize::from(match (first, found) {
-                    (Some(a), Some(b)) => (a - b).abs() > 3e-4,
-                    (None, None) => false,
-                    _ => true,
-                });
+                narrow += i32::from(range.hi.0[lane] - range.lo.0[lane] < 0.1);
+                for _ in 0..8 {
+                    let share = 0.5 + 0.5 * number();
+                    let u = f64::from(from) + (f64::from(to) - f64::from(from)) * share;
+                    let value = form.value(o + d * (3.0 + u));
+                    let held = f64::from(range.lo.0[lane]) <= value && value <= f64::from(range.hi.0[lane]);
+                    outside += i32::from(!held);
+                }
             }
         }
-        assert!(hits > 60 && wrong == 0, "{wrong} wrong of {hits}");
+        assert_eq!(outside, 0, "of a million values");
+        assert!(narrow > 5000, "bounds that mean something: {narrow}");
     }
 }

@@ -2,9 +2,9 @@
 
 use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::field;
-use crate::form::{FormBody, FormScratch};
-use crate::heights::HeightBody;
-use crate::volume::VolumeBody;
+use crate::form::{Cast, FormBody, FormScratch, Precision};
+use crate::heights::{HeightBody, HeightScratch};
+use crate::volume::{Shine, VolumeBody};
 use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::convert::DistanceModel;
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
@@ -33,8 +33,23 @@ pub(crate) struct Body {
     pub(crate) normal_map: DMat3,
     pub(crate) center: DVec3,
     pub(crate) radius: f64,
+    /// Corners of its bounds in the world.
+    pub(crate) corners: [DVec3; 8],
     /// Whether light passes: drawn in layers, casts no shadow.
     pub(crate) see_through: bool,
+    /// In which numbers the roots of forms are searched for.
+    pub(crate) precision: Precision,
+    /// Bounds in object space: of a volume what its shell leaves of it.
+    pub(crate) local_bounds: Aabb,
+    /// The lights as they arrive at the middle of a volume.
+    pub(crate) shines: Vec<Shine>,
+}
+
+/// Scratch memory of one worker for casting rays.
+#[derive(Default)]
+pub(crate) struct CastScratch {
+    form: FormScratch,
+    heights: HeightScratch,
 }
 
 /// What is cast.
@@ -77,8 +92,9 @@ impl Points<'_> {
 }
 
 impl Geometry {
-    /// Builds what is cast of a shape that is drawn as given; nothing for meshes and voxels.
-    pub(crate) fn of(shape: &Shape) -> Option<Self> {
+    /// Builds what is cast of a shape that is drawn as given, with steps through volumes in units of their spacing;
+    /// nothing for meshes and voxels.
+    pub(crate) fn of(shape: &Shape, volume_step: f64) -> Option<Self> {
         Some(match shape {
             Shape::Primitive(Primitive::Plane { width, depth }) => {
                 Self::Plane { width: *width, depth: *depth }
@@ -86,7 +102,7 @@ impl Geometry {
             Shape::Primitive(primitive) => Self::Form(FormBody::new(&FreeForm::from_primitive(primitive)?)),
             Shape::FreeForm(form) => Self::Form(FormBody::new(form)),
             Shape::HeightField(heights) => Self::Heights(HeightBody::new(heights)),
-            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume)),
+            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume, volume_step)),
             Shape::Mesh(_) | Shape::Voxels(_) => return None,
         })
     }
@@ -118,11 +134,25 @@ impl Geometry {
 }
 
 impl Body {
-    pub(crate) fn new(scene: &Scene, index: usize, object: &Object, geometry: Arc<Geometry>) -> Self {
+    pub(crate) fn new(
+        (scene, lights, precision): (&Scene, &[Light], Precision),
+        index: usize,
+        object: &Object,
+        geometry: Arc<Geometry>,
+    ) -> Self {
         let world_from_object = object.world_from_object;
-        let local = match &*geometry {
-            Geometry::Field(model) => field::bounds(model),
+        let local = match (&*geometry, &*object.shape) {
+            (Geometry::Field(model), _) => field::bounds(model),
+            (_, Shape::Volume(volume)) => {
+                let own = volume.bounds();
+                volume.shell.as_ref().map_or(own, |s| s.bounds().intersection(own))
+            }
             _ => object.shape.bounds(),
+        };
+        let center = local.transformed(&world_from_object).center();
+        let shines = match &*geometry {
+            Geometry::Volume(_) => lights.iter().filter_map(|l| Shine::arriving(l, center)).collect(),
+            _ => Vec::new(),
         };
         let bounds: Aabb = local.transformed(&world_from_object);
         let see_through = match &*geometry {
@@ -138,7 +168,14 @@ impl Body {
             center: bounds.center(),
             // The margin of the forms' own bounds.
             radius: bounds.radius() * 1.001,
+            corners: local
+                .grown(local.radius() * 1e-3)
+                .corners()
+                .map(|c| world_from_object.transform_point3(c)),
             see_through,
+            precision,
+            local_bounds: local,
+            shines,
         }
     }
 
@@ -153,32 +190,38 @@ impl Body {
         crossing: Crossing,
         rays: &[Rays],
         hits: &mut [Hits],
-        scratch: &mut FormScratch,
+        scratch: &mut CastScratch,
     ) {
-        let bounds = match &*self.geometry {
-            Geometry::Volume(_) => return,
-            Geometry::Form(form) => {
-                form.cast(&self.object_from_world, index, crossing, rays, hits, scratch);
+        match (&*self.geometry, &*self.shape) {
+            (Geometry::Volume(_), _) => return,
+            (Geometry::Form(form), _) => {
+                let cast = Cast {
+                    object_from_world: &self.object_from_world,
+                    body: index,
+                    crossing,
+                    precision: self.precision,
+                };
+                form.cast(cast, rays, hits, &mut scratch.form);
                 return;
             }
-            Geometry::Field(model) => field::bounds(model),
-            Geometry::Plane { .. } | Geometry::Heights(_) => self.shape.bounds(),
-        };
+            (Geometry::Heights(body), Shape::HeightField(heights)) => {
+                body.cast(heights, &self.object_from_world, index, rays, hits, &mut scratch.heights);
+                return;
+            }
+            _ => {}
+        }
         for (rays, hits) in rays.iter().zip(hits) {
             let open = rays.open();
             for i in (0..LANES).filter(|&i| open.has(i)) {
                 let origin = self.object_from_world.transform_point3(rays.origin.get(i));
                 let direction = self.object_from_world.transform_vector3(rays.direction.get(i));
-                let Some((near, far)) = bounds.clip(origin, direction) else { continue };
+                let Some((near, far)) = self.local_bounds.clip(origin, direction) else { continue };
                 let (near, far) = (near.max(rays.near.0[i]), far.min(rays.far.0[i]).min(hits.t.0[i]));
                 if near > far {
                     continue;
                 }
-                let t = match (&*self.geometry, &*self.shape) {
-                    (Geometry::Heights(body), Shape::HeightField(heights)) => {
-                        body.cast(heights, origin, direction, near, far)
-                    }
-                    (Geometry::Field(model), _) => field::cast(model, origin, direction, near, far),
+                let t = match &*self.geometry {
+                    Geometry::Field(model) => field::cast(model, origin, direction, near, far),
                     // The bounds of a plane are the plane.
                     _ => (direction.y != 0.0 && near > 0.0).then_some(near),
                 };

@@ -23,7 +23,7 @@ pub use primitive::Primitive;
 #[cfg(debug_assertions)]
 pub use texture::texture_lookups;
 pub use texture::{Texture, TextureWrap};
-pub use volume::{Samples, TransferFunction, TransferPoint, Volume};
+pub use volume::{Samples, TransferFunction, TransferPoint, TransferPreset, Volume};
 pub use voxels::{CHUNK, Chunk, Voxels};
 
 use crate::camera::Camera;

@@ -84,6 +84,20 @@ pub struct TransferFunction {
     pub reference_length: f64,
 }
 
+/// Transfer functions with a name, for computed tomography in Hounsfield units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TransferPreset {
+    /// Skin and muscle thin and warm, bone white and dense.
+    CtTissue,
+    /// Bone alone.
+    CtBone,
+    /// The surface of the body.
+    CtSkin,
+    /// Vessels with contrast agent, red and thin, over bone.
+    CtVessels,
+}
+
 /// One support point of a [`TransferFunction`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -103,22 +117,41 @@ impl TransferFunction {
     /// and warm, bone white and dense. The steps follow the scale: air -1000, fat -100, water 0, muscle 50, bone from 300.
     #[must_use]
     pub fn ct(reference_length: f64) -> Self {
-        let point = |value: f32, color: [f32; 3], opacity: f32| TransferPoint {
-            value,
-            color: Vec3::from_array(color),
-            opacity,
-        };
-        Self {
-            points: vec![
-                point(-500.0, [0.80, 0.45, 0.32], 0.0),
-                point(-250.0, [0.82, 0.50, 0.36], 0.02),
-                point(60.0, [0.78, 0.30, 0.22], 0.04),
-                point(180.0, [0.90, 0.70, 0.52], 0.10),
-                point(320.0, [0.95, 0.91, 0.82], 0.55),
-                point(1200.0, [1.0, 0.98, 0.94], 0.95),
+        Self::preset(TransferPreset::CtTissue, reference_length)
+    }
+
+    /// Returns a transfer function by its name.
+    #[must_use]
+    pub fn preset(preset: TransferPreset, reference_length: f64) -> Self {
+        let points: &[(f32, [f32; 3], f32)] = match preset {
+            TransferPreset::CtTissue => &[
+                (-500.0, [0.80, 0.45, 0.32], 0.0),
+                (-250.0, [0.82, 0.50, 0.36], 0.02),
+                (60.0, [0.78, 0.30, 0.22], 0.04),
+                (180.0, [0.90, 0.70, 0.52], 0.10),
+                (320.0, [0.95, 0.91, 0.82], 0.55),
+                (1200.0, [1.0, 0.98, 0.94], 0.95),
             ],
-            reference_length,
-        }
+            TransferPreset::CtBone => &[
+                (180.0, [0.86, 0.72, 0.56], 0.0),
+                (320.0, [0.95, 0.91, 0.82], 0.55),
+                (1200.0, [1.0, 0.98, 0.94], 0.95),
+            ],
+            TransferPreset::CtSkin => &[
+                (-600.0, [0.78, 0.52, 0.40], 0.0),
+                (-350.0, [0.86, 0.60, 0.47], 0.35),
+                (-100.0, [0.87, 0.62, 0.49], 0.80),
+            ],
+            TransferPreset::CtVessels => &[
+                (120.0, [0.62, 0.10, 0.08], 0.0),
+                (180.0, [0.75, 0.14, 0.10], 0.20),
+                (300.0, [0.90, 0.55, 0.40], 0.45),
+                (600.0, [0.97, 0.94, 0.88], 0.90),
+            ],
+        };
+        let point =
+            |&(value, color, opacity)| TransferPoint { value, color: Vec3::from_array(color), opacity };
+        Self { points: points.iter().map(point).collect(), reference_length }
     }
 
     /// Returns color and opacity for a value; values that are not a number are empty.
@@ -286,6 +319,21 @@ impl Volume {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn presets_leave_air_empty_and_show_what_they_are_named_after() {
+        let opacity = |preset, value| TransferFunction::preset(preset, 1.0).at(value).1;
+        use TransferPreset::{CtBone, CtSkin, CtTissue, CtVessels};
+        for preset in [CtTissue, CtBone, CtSkin, CtVessels] {
+            let transfer = TransferFunction::preset(preset, 1.0);
+            assert!(transfer.points.is_sorted_by_key(|p| p.value), "{preset:?}");
+            assert_eq!(opacity(preset, -1000.0), 0.0);
+            assert!(opacity(preset, 1000.0) > 0.7);
+        }
+        // Muscle at 50, contrast agent at 250.
+        assert_eq!([CtTissue, CtBone, CtSkin].map(|p| opacity(p, 50.0) > 0.0), [true, false, true]);
+        assert_eq!([CtBone, CtVessels].map(|p| opacity(p, 170.0) > 0.0), [false, true]);
+    }
 
     #[test]
     fn a_linear_field_is_interpolated_exactly() {

@@ -1,6 +1,6 @@
 //! The words of a scene file for shapes.
 
-use crate::scene::{Form, Primitive, TransferFunction};
+use crate::scene::{Form, Primitive, TransferFunction, TransferPreset};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -100,6 +100,9 @@ pub struct VolumeEntry {
     /// Turns values into color and opacity; left out, one that suits the range of values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transfer: Option<TransferFunction>,
+    /// A transfer function by its name, instead of `transfer`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<TransferPreset>,
     /// Draws only what lies inside this form.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shell: Option<Form>,

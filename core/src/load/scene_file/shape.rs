@@ -8,7 +8,7 @@ use crate::load::limits::{Limits, RawVolume, SampleFormat};
 use crate::load::source::Source;
 use crate::load::volume;
 use crate::math::Aabb;
-use crate::scene::{Form, FreeForm, HeightField, Mesh, Samples, Shape, Volume, Voxels};
+use crate::scene::{Form, FreeForm, HeightField, Mesh, Samples, Shape, TransferFunction, Volume, Voxels};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
@@ -264,6 +264,12 @@ fn volume_of(entry: &VolumeEntry, source: &mut Source<'_>) -> Result<(Volume, DA
             return Err(usage("the transfer function makes no sense", advice));
         }
         volume.transfer = transfer.clone();
+    }
+    if let Some(preset) = entry.preset {
+        if entry.transfer.is_some() {
+            return Err(usage("a volume has both `transfer` and `preset`", "give one of the two"));
+        }
+        volume.transfer = TransferFunction::preset(preset, volume.spacing().min_element());
     }
     if let Some(shell) = &entry.shell {
         let bounds = volume.bounds();
