@@ -17,6 +17,7 @@
 pub(crate) mod fixed;
 mod lanes;
 pub(crate) mod packet;
+mod rays;
 
 #[cfg(test)]
 mod exactness;
