@@ -310,13 +310,16 @@ impl FormBody {
                 Crossing::Entry => (found, t, NOWHERE),
                 Crossing::Any => {
                     let (rough, (t, normal, settled)) = (t, self.polish(alive, found, t, steps, values));
-                    let doubtful = found & !settled;
+                    // What matters in this part is not the whole form: beyond it a root means nothing.
+                    let beside = (t - alive.around - at.to_f64()).abs();
+                    let within = (reach * F32x8::splat(1.001)).to_f64().at_least(beside);
+                    let doubtful = found & !(settled & within);
                     if cast.precision == Precision::Single && doubtful.any() {
                         // Rounding may have made a root of large terms that nearly cancel.
                         let (again, exact) =
                             self.search_in_double(alive, (at, reach), steps, doubtful, cast.crossing, double);
                         let t = F64x8::pick(again, exact, F64x8::pick(doubtful, rough, t));
-                        let found = (found & settled) | again;
+                        let found = (found & !doubtful) | again;
                         let (t, normal, _) = self.polish(alive, found, t, steps, values);
                         (found, t, normal)
                     } else {
