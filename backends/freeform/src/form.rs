@@ -300,30 +300,64 @@ impl FormBody {
                 let (found, root) = first_roots(own, leaves, -reach, reach, open, cast.crossing, stack);
                 (found, alive.around + (at + root).to_f64())
             } else {
-                let start = alive.around + at.to_f64();
-                let (line, reach) = (alive.line(start), reach.to_f64());
-                for &step in steps {
-                    if let Step::Leaf(leaf) | Step::Bump { leaf, .. } = step {
-                        let along = line.quadric(&self.program.leaves[leaf as usize].0);
-                        double.leaves[leaf as usize] = along.bounded(reach);
-                    }
-                }
-                let Along { leaves, stack } = &mut *double;
-                let (found, root) = first_roots(steps, leaves, -reach, reach, open, cast.crossing, stack);
-                (found, start + root)
+                self.search_in_double(alive, (at, reach), steps, open, cast.crossing, double)
             };
             if !found.any() {
                 continue;
             }
-            let (t, normal) = match cast.crossing {
-                Crossing::Any => self.polish(alive, t, steps, values),
+            let (found, t, normal) = match cast.crossing {
                 // What blocks light is not looked at.
-                Crossing::Entry => (t, NOWHERE),
+                Crossing::Entry => (found, t, NOWHERE),
+                Crossing::Any => {
+                    let (rough, (t, normal, settled)) = (t, self.polish(alive, found, t, steps, values));
+                    // What matters in this part is not the whole form: beyond it a root means nothing.
+                    let beside = (t - alive.around - at.to_f64()).abs();
+                    let within = (reach * F32x8::splat(1.001)).to_f64().at_least(beside);
+                    let doubtful = found & !(settled & within);
+                    if cast.precision == Precision::Single && doubtful.any() {
+                        // Rounding may have made a root of large terms that nearly cancel.
+                        let (again, exact) =
+                            self.search_in_double(alive, (at, reach), steps, doubtful, cast.crossing, double);
+                        let t = F64x8::pick(again, exact, F64x8::pick(doubtful, rough, t));
+                        let found = (found & !doubtful) | again;
+                        let (t, normal, _) = self.polish(alive, found, t, steps, values);
+                        (found, t, normal)
+                    } else {
+                        (found, t, normal)
+                    }
+                }
             };
+            if !found.any() {
+                continue;
+            }
             hits[alive.octet].improve(found, t, cast.body, normal);
             alive.open = alive.open & !found;
         }
         left
+    }
+
+    /// Searches some of eight rays around a distance in double precision. Called, not copied: it is large and seldom used.
+    #[inline(never)]
+    fn search_in_double(
+        &self,
+        alive: &Alive,
+        (at, reach): (F32x8, F32x8),
+        steps: &[Step],
+        open: Mask8,
+        crossing: Crossing,
+        double: &mut Along<F64x8>,
+    ) -> (Mask8, F64x8) {
+        let start = alive.around + at.to_f64();
+        let (line, reach) = (alive.line(start), reach.to_f64());
+        for &step in steps {
+            if let Step::Leaf(leaf) | Step::Bump { leaf, .. } = step {
+                let along = line.quadric(&self.program.leaves[leaf as usize].0);
+                double.leaves[leaf as usize] = along.bounded(reach);
+            }
+        }
+        let Along { leaves, stack } = &mut *double;
+        let (found, root) = first_roots(steps, leaves, -reach, reach, open, crossing, stack);
+        (found, start + root)
     }
 
     /// Turns what matters in a part around its middle, and returns that, from the middle of the bounds.
@@ -344,22 +378,38 @@ impl FormBody {
         middle
     }
 
-    /// Improves distances along rays by a step of Newton's method in double precision and returns them with the
-    /// outward normals, in object space.
+    /// Improves distances along rays by steps of Newton's method in double precision and returns them with the
+    /// outward normals, in object space, and tells which came to rest.
     #[inline(always)]
     fn polish(
         &self,
         rays: &Alive,
-        t: F64x8,
+        found: Mask8,
+        first: F64x8,
         steps: &[Step],
         values: &mut Vec<(F64x8, DVec3x8)>,
-    ) -> (F64x8, DVec3x8) {
-        let p = rays.origin + rays.direction.scaled(t);
-        let (value, gradient) = values_and_gradients(&self.program, steps, p, values);
-        let step = value / gradient.dot(rays.direction);
-        // Near a tangent or a crease a step may lead away: single precision was right to 1e-5 of the size.
-        let small = F64x8::splat(self.bounds.radius() * 1e-4).above((step * rays.direction.length()).abs());
-        (F64x8::pick(small, t - step, t), NOWHERE - gradient)
+    ) -> (F64x8, DVec3x8, Mask8) {
+        let radius = F64x8::splat(self.bounds.radius()) / rays.direction.length();
+        let [longest, far, close] = [1e-3, 1e-2, 3e-6].map(|share| radius * F64x8::splat(share));
+        let (mut t, mut normal, mut moving) = (first, NOWHERE, found);
+        // One step is enough but where a ray nearly touches the surface: single precision is far off there.
+        for _ in 0..8 {
+            let p = rays.origin + rays.direction.scaled(t);
+            let (value, gradient) = values_and_gradients(&self.program, steps, p, values);
+            normal = NOWHERE - gradient;
+            let step = value / gradient.dot(rays.direction);
+            let ahead = F64x8::pick(step.above(longest), longest, step);
+            let step = F64x8::pick((-longest).above(step), -longest, ahead);
+            // What is no number, on a surface that turns away from the ray, moves nothing.
+            t = t - F64x8::pick(step.equal(step), step, F64x8::ZERO);
+            moving = found & step.abs().above(close);
+            if !moving.any() {
+                break;
+            }
+        }
+        // At a crease or a tangent steps may lead away, or nowhere.
+        let settled = far.above((t - first).abs()) & !moving;
+        (F64x8::pick(settled, t, first), normal, settled)
     }
 }
 

@@ -427,9 +427,13 @@ impl FrameDrawing<'_> {
         {
             (pixels.id.0[lane], pixels.distance.0[lane]) = (body.object as u32 + 1, t as f32);
             let p = stretch.origin + stretch.direction * t;
-            let normal = body.normal_map * -shape.gradient(p);
-            pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
-            pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
+            if self.channels.has(Channel::Normal) {
+                let normal = body.normal_map * -shape.gradient(p);
+                pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
+            }
+            if self.channels.has(Channel::Albedo) {
+                pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
+            }
         }
     }
 

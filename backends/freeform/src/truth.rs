@@ -168,6 +168,7 @@ impl Count {
         let [above, below] = [truth(MARGIN), truth(-MARGIN)];
         if near(above, right) && near(below, right) {
             *kind += 1;
+            println!("{ray:?}: {met:?} for {right:?}, moved {above:?} and {below:?}");
         } else {
             self.within_margin += 1;
         }
@@ -188,10 +189,17 @@ fn random_forms_are_met_where_a_slow_search_says() {
 /// The whole of it: fifty forms, 20,000 rays each. Takes minutes.
 #[test]
 #[ignore = "takes minutes"]
-fn a_million_rays_meet_random_forms_where_a_slow_search_says() {
-    for precision in [Precision::Single, Precision::Double] {
-        let count = count(50, 2500, precision);
-        println!("{precision:?}: {count:?}");
-        count.check("whole");
-    }
+fn a_million_rays_meet_random_forms_in_single_precision() {
+    let count = count(50, 2500, Precision::Single);
+    println!("{count:?}");
+    count.check("single");
+}
+
+/// The same in double precision.
+#[test]
+#[ignore = "takes minutes"]
+fn a_million_rays_meet_random_forms_in_double_precision() {
+    let count = count(50, 2500, Precision::Double);
+    println!("{count:?}");
+    count.check("double");
 }
