@@ -28,6 +28,12 @@ const MOST: [usize; 2] = [7, 5];
 #[must_use]
 pub fn quality_axes(info: &BackendInfo, scene: &Scene, ruler_samples: u32) -> Vec<QualityAxis> {
     let has_volume = scene.objects.iter().any(|o| matches!(&*o.shape, Shape::Volume(_)));
+    // Bodies of second order alone have closed forms, which are reckoned in double precision anyway.
+    let has_form = scene.objects.iter().any(|o| match &*o.shape {
+        Shape::FreeForm(_) => true,
+        Shape::Volume(volume) => volume.shell.is_some(),
+        _ => false,
+    });
     let mut axes = Vec::new();
     // A renderer over a renderer draws nothing natively: its inner one may convert.
     let converts = ShapeKind::ALL
@@ -43,6 +49,7 @@ pub fn quality_axes(info: &BackendInfo, scene: &Scene, ruler_samples: u32) -> Ve
     }
     for parameter in info.parameters.iter().filter(|p| p.quality_axis) {
         let is_idle = (parameter.tag == "volume.step" && !has_volume)
+            || (parameter.tag == "roots.precision" && !has_form)
             || (parameter.tag == "detail.tolerance" && !converts);
         if !is_idle {
             axes.push(of_parameter(parameter, ruler_samples));
@@ -108,10 +115,13 @@ mod tests {
         let scene = crate::builtin::scene("atelier").unwrap();
         for (info, _) in registry.iter() {
             let axes = quality_axes(info, &scene, 32);
-            assert!(!axes.is_empty(), "{} has no axis", info.id);
+            let is_long = |axis: &QualityAxis| axis.values.len() >= 4;
+            assert!(axes.iter().any(is_long), "{} has no axis", info.id);
             for axis in &axes {
-                assert!(axis.values.len() >= 4, "{} {}: {:?}", info.id, axis.name, axis.values);
-                if let Some(parameter) = info.parameters.iter().find(|p| p.name == axis.name) {
+                let parameter = info.parameters.iter().find(|p| p.name == axis.name);
+                let is_choice = parameter.is_some_and(|p| matches!(p.kind, ParameterKind::Choice { .. }));
+                assert!(is_choice || axis.values.len() >= 4, "{} {}: {:?}", info.id, axis.name, axis.values);
+                if let Some(parameter) = parameter {
                     for value in &axis.values {
                         assert_eq!(parameter.parse(&value.to_string()).as_ref(), Ok(value));
                     }

@@ -61,7 +61,7 @@ fn info() -> BackendInfo {
                 default: Value::Text("single".to_owned()),
                 unit: "",
                 help: "numbers in which roots of free forms are searched for; both end with a step in double precision",
-                tag: "precision",
+                tag: "roots.precision",
                 quality_axis: true,
             },
             Parameter {
