@@ -206,7 +206,7 @@ fn refusals_and_crashes_while_opening_are_told() {
     let folder = folder("opening");
     for (option, words) in [
         ("NULL_TABLE", "returned nothing"),
-        ("OTHER_MAJOR", "speaks version 2.0"),
+        ("OTHER_MAJOR", "speaks version 2."),
         ("CRASH_IN_ENTRY", "while it was opened: it touched memory that is not its own"),
     ] {
         let library = folder.join(format!("lib{option}.so"));

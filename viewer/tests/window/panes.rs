@@ -56,7 +56,10 @@ fn a_parameter_changes_the_picture_and_is_kept() {
     harness.get_by_label("Settings").click();
     rest(&mut harness);
     drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
-    harness.get_by_role(Role::CheckBox).click();
+    // The last of its switches is that for shadows; it may be below what is seen of the panel.
+    harness.get_all_by_role(Role::CheckBox).last().expect("a switch").scroll_to_me();
+    rest(&mut harness);
+    harness.get_all_by_role(Role::CheckBox).last().expect("a switch").click();
     rest(&mut harness);
     let set = |harness: &Harness<'_, Viewer>| harness.state().settings("voxel").iter().count();
     assert_eq!(set(&harness), 1);
