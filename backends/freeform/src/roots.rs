@@ -176,7 +176,11 @@ pub(crate) fn first_roots<N: Number>(
     (hit, root)
 }
 
-/// Closes in on a root by Newton's method, by bisection where a step would leave the bracket.
+/// Most steps towards a root: halving alone resolves a bracket with about as many. Few take more than four.
+const HALVINGS: usize = 48;
+
+/// Closes in on a root by Newton's method, by bisection where a step would leave the bracket or is no shorter than half
+/// of the one before.
 #[inline(always)]
 fn refine<N: Number>(
     steps: &[Step],
@@ -188,10 +192,10 @@ fn refine<N: Number>(
     values: &mut Vec<(N, N)>,
 ) -> N {
     let half = N::number(0.5);
-    // The next step of Newton's method squares what is left of a share of the bracket.
-    let close = (hi - lo) * N::number(1e-4);
-    let mut u = (lo + hi) * half;
-    for _ in 0..7 {
+    // The next step of Newton's method squares what is left of a share of the bracket; less than rounding means nothing.
+    let close = ((hi - lo) * N::number(1e-4)).max((lo.abs() + hi.abs()) * N::number(4.0 * N::ROUNDING));
+    let (mut u, mut last) = ((lo + hi) * half, hi - lo);
+    for _ in 0..HALVINGS {
         let (f, slope) = value(steps, leaves, u, values);
         let inside = f.at_least(N::ZERO);
         let same = (inside & inside_at_lo) | (!inside & !inside_at_lo);
@@ -199,8 +203,11 @@ fn refine<N: Number>(
         hi = N::pick(same, hi, u);
         let newton = u - f / slope;
         let within = newton.at_least(lo) & hi.at_least(newton);
-        let next = N::pick(within, newton, (lo + hi) * half);
-        let moved = (next - u).abs().above(close) & wanted;
+        // Steps that do not shrink may go to and fro for ever, around a turn of the function.
+        let shrinks = (last * half).at_least((newton - u).abs());
+        let next = N::pick(within & shrinks, newton, (lo + hi) * half);
+        last = (next - u).abs();
+        let moved = last.above(close) & wanted;
         u = next;
         if !moved.any() {
             break;

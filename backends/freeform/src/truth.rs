@@ -3,7 +3,7 @@
 use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::form::{Cast, FormBody, FormScratch, Precision};
 use glam::{DAffine3, DVec3};
-use polyptych_core::lanes::{F64x8, LANES};
+use polyptych_core::lanes::{DVec3x8, F64x8, LANES};
 use polyptych_core::math::Interval;
 use polyptych_core::scene::{Form, FreeForm, Perturbation, Power};
 
@@ -105,33 +105,49 @@ struct Count {
     worst: f64,
 }
 
+/// Makes one of so many forms, and what its rays are drawn from.
+fn seeded(forms: u64, seed: u64) -> (Form, Random) {
+    let mut random = Random(0x9E37_79B9_7F4A_7C15 ^ (seed * 7919 + 1));
+    (0..20).for_each(|_| {
+        random.next();
+    });
+    let form = random.form(1 + (seed * 64 / forms.max(1)) as u32, 1 + seed as u32 % 3);
+    (form, random)
+}
+
+/// Casts eight rays that are close to one another from a random eye.
+fn cast(
+    body: &FormBody,
+    random: &mut Random,
+    precision: Precision,
+    scratch: &mut FormScratch,
+) -> (DVec3, DVec3x8, Hits) {
+    let eye = random.point().normalize_or(DVec3::X) * (2.5 + random.next());
+    let (mut direction, aim) = (NOWHERE, random.point() * 0.9);
+    for lane in 0..LANES {
+        direction.set(lane, (aim + random.point() * 0.1 - eye).normalize_or(DVec3::X));
+    }
+    let (origin, far) = (DVec3x8::splat(eye), F64x8::splat(f64::INFINITY));
+    let rays = [Rays { origin, direction, near: F64x8::ZERO, far }];
+    let mut hits = [Hits::nothing(&rays[0])];
+    let place = DAffine3::IDENTITY;
+    let cast = Cast { object_from_world: &place, body: 0, crossing: Crossing::Any, precision };
+    body.cast(cast, &rays, &mut hits, scratch);
+    let [hits] = hits;
+    (eye, direction, hits)
+}
+
 fn count(forms: u64, octets: u32, precision: Precision) -> Count {
     let mut count = Count::default();
     for seed in 0..forms {
-        let mut random = Random(0x9E37_79B9_7F4A_7C15 ^ (seed * 7919 + 1));
-        (0..20).for_each(|_| {
-            random.next();
-        });
-        let form = random.form(1 + (seed * 64 / forms.max(1)) as u32, 1 + seed as u32 % 3);
+        let (form, mut random) = seeded(forms, seed);
         let Ok(whole) = FreeForm::new(form) else { continue };
         let body = FormBody::new(&whole);
         let mut scratch = FormScratch::default();
         for _ in 0..octets {
-            let eye = random.point().normalize_or(DVec3::X) * (2.5 + random.next());
-            let (mut direction, aim) = (NOWHERE, random.point() * 0.9);
+            let (eye, direction, hits) = cast(&body, &mut random, precision, &mut scratch);
             for lane in 0..LANES {
-                let toward = (aim + random.point() * 0.1 - eye).normalize_or(DVec3::X);
-                direction.set(lane, toward);
-            }
-            let origin = polyptych_core::lanes::DVec3x8::splat(eye);
-            let far = F64x8::splat(f64::INFINITY);
-            let rays = [Rays { origin, direction, near: F64x8::ZERO, far }];
-            let mut hits = [Hits::nothing(&rays[0])];
-            let place = DAffine3::IDENTITY;
-            let cast = Cast { object_from_world: &place, body: 0, crossing: Crossing::Any, precision };
-            body.cast(cast, &rays, &mut hits, &mut scratch);
-            for lane in 0..LANES {
-                let met = hits[0].any().has(lane).then_some(hits[0].t.0[lane]);
+                let met = hits.any().has(lane).then_some(hits.t.0[lane]);
                 count.add(&whole, (eye, direction.get(lane)), met);
             }
         }
@@ -184,6 +200,26 @@ impl Count {
 fn random_forms_are_met_where_a_slow_search_says() {
     count(50, 16, Precision::Single).check("single");
     count(50, 4, Precision::Double).check("double");
+}
+
+/// Where much of a bracket is flat, steps of Newton's method leave it, and it is halved many times.
+#[test]
+fn hits_lie_on_the_surface_however_slowly_roots_are_closed_in_on() {
+    for seed in [40, 43] {
+        let (form, mut random) = seeded(50, seed);
+        let Ok(whole) = FreeForm::new(form) else { continue };
+        let (body, mut scratch) = (FormBody::new(&whole), FormScratch::default());
+        let mut met = 0;
+        for _ in 0..2500 {
+            let (eye, direction, hits) = cast(&body, &mut random, Precision::Single, &mut scratch);
+            for lane in (0..LANES).filter(|&lane| hits.any().has(lane)) {
+                let value = whole.form().value(eye + direction.get(lane) * hits.t.0[lane]);
+                assert!(value.abs() < 1e-3, "seed {seed}, {eye}, {}: {value}", direction.get(lane));
+                met += 1;
+            }
+        }
+        assert!(met > 9000, "{met}");
+    }
 }
 
 /// The whole of it: fifty forms, 20,000 rays each. Takes minutes.
