@@ -210,8 +210,14 @@ pub(super) fn closest_weights([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
     if sum > 0.0 { DVec3::new(va, vb, vc) / sum } else { DVec3::X }
 }
 
-/// Tells whether more than one in a hundred edges belongs to one triangle only, vertices welded to a millionth of the size.
+/// Tells whether more than one in a hundred edges belongs to one triangle only.
 fn is_open(mesh: &Mesh) -> bool {
+    let (border, all) = border_edges(mesh);
+    border * 100 > all
+}
+
+/// Counts the edges that belong to one triangle only, and all edges, vertices welded to a millionth of the size.
+pub(super) fn border_edges(mesh: &Mesh) -> (usize, usize) {
     let grid = mesh.bounds().radius().max(1e-30) * 1e-6;
     let key = |i: u32| (mesh.positions[i as usize].as_dvec3() / grid).round().to_array().map(|c| c as i64);
     let mut edges: HashMap<_, u32> = HashMap::with_capacity(mesh.triangles.len() * 2);
@@ -221,8 +227,7 @@ fn is_open(mesh: &Mesh) -> bool {
             *edges.entry(if a < b { (a, b) } else { (b, a) }).or_insert(0) += 1;
         }
     }
-    let border = edges.values().filter(|&&n| n == 1).count();
-    border * 100 > edges.len()
+    (edges.values().filter(|&&n| n == 1).count(), edges.len())
 }
 
 /// Tells for each sample whether it is inside, by the majority of three parity counts.

@@ -27,7 +27,8 @@ use std::sync::Arc;
 pub struct Converter {
     meshes: Cache<MeshModel>,
     levels: Cache<MeshModel>,
-    voxels: Cache<VoxelModel>,
+    /// For each [`Filling`].
+    voxels: [Cache<VoxelModel>; 4],
     distances: Cache<DistanceModel>,
 }
 
@@ -150,6 +151,36 @@ pub struct Detail {
     pub max_resolution: u32,
 }
 
+/// Which cells of a grid a shape fills.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Filling {
+    /// Bodies that are told by a formula or by samples as a whole, triangles and heights as their surface.
+    #[default]
+    Natural,
+    /// The surface, so that no way leads from one side to the other over empty cells, be it over their faces, edges or
+    /// corners (26-separating): of triangles all cells that they touch, of bodies those with an empty neighbor.
+    Surface,
+    /// The surface, so that no way over faces of empty cells leads from one side to the other (6-separating): about half
+    /// as many cells.
+    Thin,
+    /// All cells whose middle is inside: of a closed mesh those with a winding number other than 0; of an open one those
+    /// that most directions call so, and its surface.
+    Solid,
+}
+
+impl Filling {
+    /// All of them, in the order of [`Filling::NAMES`].
+    pub const ALL: [Self; 4] = [Self::Natural, Self::Surface, Self::Thin, Self::Solid];
+    /// What they are called in commands and parameters.
+    pub const NAMES: [&'static str; 4] = ["natural", "surface", "thin", "solid"];
+
+    /// Returns the one of a name.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().position(|&n| n == name).map(|i| Self::ALL[i])
+    }
+}
+
 impl Detail {
     /// Returns the class of the tolerance for an object, rounded down: half octaves of its share of the body's size.
     /// What is converted is the same for all tolerances of a class.
@@ -172,7 +203,7 @@ impl Converter {
     /// Counts the conversions at hand: meshes, voxels, grids of distances. What nobody asked for is none.
     #[must_use]
     pub fn kept(&self) -> [usize; 3] {
-        [self.meshes.count(), self.voxels.count(), self.distances.count()]
+        [self.meshes.count(), self.voxels.iter().map(Cache::count).sum(), self.distances.count()]
     }
 
     /// Returns the shape of an object as triangles. Meshes are returned as they are.
@@ -247,7 +278,7 @@ impl Converter {
         })
     }
 
-    /// Returns the shape of an object as voxels: solid bodies filled, meshes and height fields as their surface.
+    /// Returns the shape of an object as voxels: bodies filled, meshes and height fields as their surface.
     ///
     /// # Errors
     /// When the shape has no surface at all.
@@ -258,9 +289,25 @@ impl Converter {
         detail: Detail,
         threads: &dyn Threads,
     ) -> Result<Arc<VoxelModel>, ConvertError> {
+        self.voxels_filled(scene, object, detail, Filling::Natural, threads)
+    }
+
+    /// Returns the shape of an object as voxels of your choice. Grids are returned as they are.
+    ///
+    /// # Errors
+    /// When the shape has no surface at all.
+    pub fn voxels_filled(
+        &self,
+        scene: &Scene,
+        object: &Object,
+        detail: Detail,
+        filling: Filling,
+        threads: &dyn Threads,
+    ) -> Result<Arc<VoxelModel>, ConvertError> {
         let scale = scale_of(object);
-        self.voxels.get(scene, object, detail, |tolerance| {
-            let mut model = voxelize::voxelize(scene, object, tolerance, detail.max_resolution, threads)
+        self.voxels[filling as usize].get(scene, object, detail, |tolerance| {
+            let resolution = detail.max_resolution;
+            let mut model = voxelize::voxelize(scene, object, tolerance, resolution, filling, threads)
                 .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
             model.bound *= scale;
             note_normal_maps(&mut model.why, scene, object);
@@ -334,7 +381,7 @@ impl Converter {
     /// Tells what [`Converter::voxels`] would make.
     #[must_use]
     pub fn voxels_forecast(&self, scene: &Scene, object: &Object, detail: Detail) -> Forecast {
-        if let Some(model) = self.voxels.find(scene, object, detail) {
+        if let Some(model) = self.voxels[Filling::Natural as usize].find(scene, object, detail) {
             return Forecast::of_grid(model.voxels.bytes(), model.bound, model.why.clone());
         }
         let scale = scale_of(object);
