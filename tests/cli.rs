@@ -170,8 +170,25 @@ fn convert_writes_models_that_load_again() {
 }
 
 #[test]
+fn convert_fills_voxels_as_it_is_told() {
+    let out = folder("filling");
+    let filled = |filling: &str| {
+        let file = out.join(format!("{filling}.vox"));
+        let words = ["convert", "builtin:polyhedra", text(&file), "--resolution", "64", "--filling", filling];
+        let done = polyptych(&words);
+        assert_eq!(done.status.code(), Some(0), "{filling}: {}", String::from_utf8_lossy(&done.stderr));
+        let scene = polyptych::load::load(&file, &polyptych::load::LoadOptions::default()).unwrap();
+        let polyptych::scene::Shape::Voxels(voxels) = &*scene.objects[0].shape else { panic!("voxels") };
+        voxels.filled()
+    };
+    let [thin, surface, natural, solid] = ["thin", "surface", "natural", "solid"].map(filled);
+    assert!(thin < surface && surface == natural && solid > thin, "{thin} {surface} {natural} {solid}");
+}
+
+#[test]
 fn refusals_are_one_line_with_the_code_of_their_kind() {
-    let cases: [(&[&str], i32, &str); 10] = [
+    let cases: [(&[&str], i32, &str); 11] = [
+        (&["convert", "builtin:atelier", "x.obj", "--filling", "solid"], 2, "only voxels are filled"),
         (&["render", "no/such/file.obj", "-o", "x.png"], 3, "no/such/file.obj"),
         (&["render", "builtin:nothing", "-o", "x.png"], 3, "atelier, polyhedra"),
         (&["render", "Cargo.toml", "-o", "x.png"], 3, "Cargo.toml"),

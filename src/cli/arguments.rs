@@ -1,6 +1,7 @@
 //! What the command line looks like.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use polyptych::convert::Filling;
 use polyptych::framebuffer::Channel;
 use std::path::PathBuf;
 
@@ -202,6 +203,10 @@ pub(super) struct ConvertArguments {
     /// Greatest distance between the surfaces, meters.
     #[arg(long)]
     pub(super) tolerance: Option<f64>,
+    /// Which cells are filled in a .vox file: those that the surface touches (`surface`, `natural`), as few as stop water
+    /// over faces (`thin`), or all whose middle is inside (`solid`).
+    #[arg(long, value_name = "natural|surface|thin|solid", value_parser = filling)]
+    pub(super) filling: Option<Filling>,
     /// Threads; 0 = one for each core.
     #[arg(long, default_value_t = 0)]
     pub(super) threads: usize,
@@ -288,6 +293,9 @@ pub(super) struct ReadingArguments {
     /// Read a picture as a height map.
     #[arg(long)]
     pub(super) height_map: bool,
+    /// Which frame of an animated .vox file is shown, counted from 0.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) frame: u32,
 }
 
 /// How to draw: shared by all commands that draw.
@@ -388,6 +396,10 @@ fn channel(text: &str) -> Result<Channel, String> {
         .into_iter()
         .find(|c| c.name() == text)
         .ok_or_else(|| format!("use one of {}", names.join(", ")))
+}
+
+fn filling(text: &str) -> Result<Filling, String> {
+    Filling::of_name(text).ok_or_else(|| format!("use one of {}", Filling::NAMES.join(", ")))
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {

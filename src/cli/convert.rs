@@ -2,7 +2,7 @@
 
 use super::arguments::{ConvertArguments, PluginArguments, Representation};
 use super::{Failure, input, print};
-use polyptych::convert::Detail;
+use polyptych::convert::{Detail, Filling};
 use polyptych::export::export;
 use serde_json::json;
 
@@ -39,7 +39,11 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Failure> {
         (None, None) => Detail { tolerance: longest / 256.0, max_resolution: 128 },
     };
     let studio = input::studio(arguments.threads, &PluginArguments::default())?;
-    let done = export(&scene, &arguments.output, detail, studio.converter(), studio.pool())
+    let filling = arguments.filling.unwrap_or_default();
+    if filling != Filling::Natural && extension != "vox" {
+        return Err(Failure::wrong_use("--filling: only voxels are filled, write a .vox file"));
+    }
+    let done = export(&scene, &arguments.output, detail, filling, studio.converter(), studio.pool())
         .map_err(Failure::running)?;
     if arguments.json {
         let out = arguments.output.to_string_lossy();

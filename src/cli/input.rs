@@ -36,7 +36,8 @@ pub(super) fn named_scene(name: &str, reading: &ReadingArguments) -> Result<Arc<
             text.parse::<RawVolume>().map_err(|e| Failure::wrong_use(format!("--volume {text}: {e}")))
         })
         .transpose()?;
-    let options = LoadOptions { volume, height_map: reading.height_map, ..LoadOptions::default() };
+    let (height_map, frame) = (reading.height_map, reading.frame);
+    let options = LoadOptions { volume, height_map, frame, ..LoadOptions::default() };
     load(Path::new(name), &options).map(Arc::new).map_err(Failure::input)
 }
 

@@ -1,7 +1,7 @@
 //! Which objects are grids already, which become one, and what scene results?
 
 use crate::grid::Grid;
-use polyptych_core::convert::{Converter, Detail, VoxelModel};
+use polyptych_core::convert::{Converter, Detail, Filling, VoxelModel};
 use polyptych_core::scene::{Object, Scene, Shape, Voxels};
 use polyptych_core::seam::{self, Control, Decision, Need, RenderError};
 use std::collections::HashMap;
@@ -53,7 +53,7 @@ pub(crate) fn converted(shape: &Shape, bound: f64, what: &str) -> Decision {
 pub(crate) fn build(
     scene: &Arc<Scene>,
     need: &Need,
-    resolution: u32,
+    (resolution, filling): (u32, Filling),
     converter: &Converter,
     control: &Control<'_>,
 ) -> Result<Model, RenderError> {
@@ -71,7 +71,7 @@ pub(crate) fn build(
         let made = match skipped {
             Some(why) => Err(why),
             None => converter
-                .voxels(scene, object, detail(object, need, resolution), control.threads)
+                .voxels_filled(scene, object, detail(object, need, resolution), filling, control.threads)
                 .map_err(|e| e.reason),
         };
         match made {

@@ -9,7 +9,7 @@ use crate::plan::plan;
 use crate::trace::{Shadows, Tracer};
 use crate::world::{Counts, Item, Numbers, World};
 use polyptych_core::camera::Camera;
-use polyptych_core::convert::Converter;
+use polyptych_core::convert::{Converter, Filling};
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::scene::{AlphaMode, Scene, ShapeKind};
 use polyptych_core::seam::{
@@ -88,6 +88,10 @@ impl Voxel {
         need.settings.int(&self.info.parameters, "detail.resolution").clamp(16, 1024) as u32
     }
 
+    fn filling(&self, need: &Need) -> Filling {
+        Filling::of_name(need.settings.text(&self.info.parameters, "detail.filling")).unwrap_or_default()
+    }
+
     fn walk(&self, need: &Need) -> Numbers {
         match need.settings.text(&self.info.parameters, "walk") {
             "fast" => Numbers::Fast,
@@ -147,6 +151,15 @@ fn info() -> BackendInfo {
                 help: "Most cells along the longest edge of an object that is converted",
                 tag: "detail.tolerance",
                 quality_axis: true,
+            },
+            Parameter {
+                name: "detail.filling",
+                kind: ParameterKind::Choice { choices: &Filling::NAMES },
+                default: Value::Text("natural".to_owned()),
+                unit: "",
+                help: "Cells that are filled: by nature, a surface that stops water over corners or just over faces, or what is inside",
+                tag: "",
+                quality_axis: false,
             },
             Parameter {
                 name: "walk",
@@ -214,7 +227,8 @@ impl Renderer for Voxel {
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
         (self.ready, self.last) = (None, None);
-        let model = model::build(scene, need, self.resolution(need), converter, control)?;
+        let model =
+            model::build(scene, need, (self.resolution(need), self.filling(need)), converter, control)?;
         self.chunks.begin();
         let (items, grid_bytes) = self.items(&model, control)?;
         self.chunks.end();

@@ -46,6 +46,8 @@ pub struct LoadOptions {
     pub volume: Option<RawVolume>,
     /// Reads a picture as a height map.
     pub height_map: bool,
+    /// Which frame of an animated `.vox` file is shown, counted from 0.
+    pub frame: u32,
     /// How much a file may claim.
     pub limits: Limits,
 }

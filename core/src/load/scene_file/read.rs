@@ -6,7 +6,7 @@ use super::schema_shapes::ShapeEntry;
 use super::shape;
 use crate::load::error::{Fault, one_line};
 use crate::load::image::{Holds, TextureMaker, checker};
-use crate::load::limits::{LoadOptions, RawVolume};
+use crate::load::limits::LoadOptions;
 use crate::load::source::Source;
 use crate::load::text::decode_text;
 use crate::scene::{NormalMap, Object, Scene, Texture};
@@ -76,18 +76,18 @@ pub(super) fn with_included<T>(
     source: &mut Source<'_>,
     read: impl FnOnce(&mut Source<'_>) -> Result<T, Fault>,
 ) -> Result<T, Fault> {
-    with_included_options(file, source, None, read)
+    with_included_options(file, source, LoadOptions::default(), read)
 }
 
-/// The same, with the format of a raw volume.
+/// The same, with what the scene file says about the file.
 pub(super) fn with_included_options<T>(
     file: &str,
     source: &mut Source<'_>,
-    volume: Option<RawVolume>,
+    options: LoadOptions,
     read: impl FnOnce(&mut Source<'_>) -> Result<T, Fault>,
 ) -> Result<T, Fault> {
     let path = source.folder.find(file)?;
-    let options = LoadOptions { volume, height_map: true, limits: source.limits.clone() };
+    let options = LoadOptions { height_map: true, limits: source.limits.clone(), ..options };
     let mut inner = Source::open(&path, &options, source.folder.read(file)?);
     let made = read(&mut inner).map_err(|fault| fault.at(format_args!("`{}`", one_line(file))));
     for line in inner.notes.into_lines() {
@@ -111,7 +111,8 @@ fn holds(file: &SceneFile, name: &str) -> Result<Holds, Fault> {
 type Included = Arc<Vec<Object>>;
 
 struct Builder {
-    models: HashMap<String, Included>,
+    /// By file and frame.
+    models: HashMap<(String, u32), Included>,
     materials: BTreeMap<String, usize>,
     scene: Scene,
 }
@@ -179,8 +180,8 @@ impl Builder {
     ) -> Result<(), Fault> {
         let world_from_entry = transform(&entry.transform)?;
         let materials = self.named_materials(entry)?;
-        if let ShapeEntry::Model { file } = &entry.shape {
-            return self.add_model(file, entry, world_from_entry, &materials, source);
+        if let ShapeEntry::Model { file, frame } = &entry.shape {
+            return self.add_model((file, *frame), entry, world_from_entry, &materials, source);
         }
         let (shape, turned) = shape::build(&entry.shape, source)?;
         let name = if entry.name.is_empty() {
@@ -216,17 +217,18 @@ impl Builder {
     /// Places the objects of a model file, which is read once however often it is placed.
     fn add_model(
         &mut self,
-        file: &str,
+        (file, frame): (&str, u32),
         entry: &ObjectEntry,
         world_from_model: DAffine3,
         materials: &[usize],
         source: &mut Source<'_>,
     ) -> Result<(), Fault> {
-        let model = match self.models.get(file) {
+        let key = (file.to_owned(), frame);
+        let model = match self.models.get(&key) {
             Some(model) => model.clone(),
             None => {
-                let model = Arc::new(self.read_model(file, source)?);
-                self.models.insert(file.to_owned(), model.clone());
+                let model = Arc::new(self.read_model(file, frame, source)?);
+                self.models.insert(key, model.clone());
                 model
             }
         };
@@ -241,14 +243,16 @@ impl Builder {
             if !materials.is_empty() {
                 object.materials = materials.to_vec();
             }
-            (object.visible, object.required) = (entry.visible, entry.required);
+            // What the model hides stays hidden.
+            (object.visible, object.required) = (object.visible && entry.visible, entry.required);
             self.push(object, source)?;
         }
         Ok(())
     }
 
-    fn read_model(&mut self, file: &str, source: &mut Source<'_>) -> Result<Vec<Object>, Fault> {
-        let mut model = with_included(file, source, |inner| {
+    fn read_model(&mut self, file: &str, frame: u32, source: &mut Source<'_>) -> Result<Vec<Object>, Fault> {
+        let options = LoadOptions { frame, ..LoadOptions::default() };
+        let mut model = with_included_options(file, source, options, |inner| {
             let is_model = matches!(inner.extension.as_str(), "obj" | "gltf" | "glb" | "stl" | "ply" | "vox");
             if !is_model {
                 let what = format!("files `.{}` are no models", one_line(&inner.extension));

@@ -14,6 +14,9 @@ pub enum ShapeEntry {
     Model {
         /// Its name, relative to the scene file.
         file: String,
+        /// Which frame of an animated .vox file is shown, counted from 0.
+        #[serde(default, skip_serializing_if = "is_first")]
+        frame: u32,
     },
     /// Triangles and segments.
     Mesh(MeshEntry),
@@ -36,6 +39,10 @@ pub enum ShapeEntry {
     HeightField(HeightEntry),
     /// A scalar field.
     Volume(VolumeEntry),
+}
+
+fn is_first(frame: &u32) -> bool {
+    *frame == 0
 }
 
 /// Triangles and segments; lists are empty or as long as the positions.

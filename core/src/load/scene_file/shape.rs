@@ -4,7 +4,7 @@ use super::place::usage;
 use super::schema_shapes::{HeightEntry, MeshEntry, ShapeEntry, VolumeEntry};
 use crate::load::error::Fault;
 use crate::load::height;
-use crate::load::limits::{Limits, RawVolume, SampleFormat};
+use crate::load::limits::{Limits, LoadOptions, RawVolume, SampleFormat};
 use crate::load::source::Source;
 use crate::load::volume;
 use crate::math::Aabb;
@@ -36,7 +36,7 @@ pub(super) fn build(entry: &ShapeEntry, source: &mut Source<'_>) -> Result<(Shap
             let (volume, turned) = volume_of(entry, source)?;
             return Ok((Shape::Volume(volume), turned));
         }
-        ShapeEntry::Model { file } => {
+        ShapeEntry::Model { file, .. } => {
             return Err(Fault::malformed(format!("model `{file}` is no single shape")));
         }
     };
@@ -242,7 +242,10 @@ fn volume_of(entry: &VolumeEntry, source: &mut Source<'_>) -> Result<(Volume, DA
         None => None,
     };
     let (mut volume, turned) = match (&entry.file, &entry.samples, format) {
-        (Some(file), None, format) => super::read::with_included_options(file, source, format, volume::read)?,
+        (Some(file), None, volume) => {
+            let options = LoadOptions { volume, ..LoadOptions::default() };
+            super::read::with_included_options(file, source, options, volume::read)?
+        }
         (None, Some(samples), Some(format)) => {
             (inline_volume(samples, format, source.limits)?, DAffine3::IDENTITY)
         }

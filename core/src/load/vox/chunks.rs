@@ -49,12 +49,26 @@ impl<'a> Dict<'a> {
 
 /// A node of the scene graph.
 pub(super) enum Node<'a> {
-    /// Places its child; only the first frame is kept.
-    Transform { attributes: Dict<'a>, child: i32, layer: i32, frame: Dict<'a> },
+    /// Places its child, at each frame that is named elsewhere.
+    Transform { attributes: Dict<'a>, child: i32, layer: i32, frames: Vec<Dict<'a>> },
     /// Holds others.
     Group { attributes: Dict<'a>, children: Vec<i32> },
-    /// Shows a model, the first of its frames.
-    Shape { attributes: Dict<'a>, model: i32 },
+    /// Shows a model, from each frame that is named on another.
+    Shape { attributes: Dict<'a>, models: Vec<(i32, Dict<'a>)> },
+}
+
+/// Returns what holds at a frame: the last that begins at it or before, else the first. What does not name its frame
+/// (`_f`) has that of its place in the list.
+pub(super) fn at_frame<'b, T>(list: &'b [T], frame: u32, dict: impl Fn(&T) -> &Dict<'_>) -> Option<&'b T> {
+    let begins = |i: usize, item: &T| dict(item).number("_f").unwrap_or(i as f32);
+    let begun = list.iter().enumerate().filter(|(i, item)| begins(*i, item) <= frame as f32);
+    // Of equals the first.
+    let last = begun.reduce(
+        |best, other| {
+            if begins(other.0, other.1) > begins(best.0, best.1) { other } else { best }
+        },
+    );
+    last.map(|(_, item)| item).or(list.first())
 }
 
 /// Reads all chunks.
@@ -143,7 +157,7 @@ impl<'a> Chunks<'a> {
             }
             b"nTRN" | b"nGRP" | b"nSHP" => {
                 let id = c.i32()?;
-                let node = c.node(kind, notes)?;
+                let node = c.node(kind)?;
                 if id < 0 || self.nodes.insert(id, node).is_some() {
                     return Err(Fault::malformed(format!(
                         "node {id} is there twice, or its number is negative"
@@ -222,17 +236,14 @@ impl<'a> Cursor<'a> {
         (0..count).map(|_| Ok((self.text()?, self.text()?))).collect::<Result<_, _>>().map(Dict)
     }
 
-    fn node(&mut self, kind: &[u8], notes: &mut Notes) -> Result<Node<'a>, Fault> {
+    fn node(&mut self, kind: &[u8]) -> Result<Node<'a>, Fault> {
         let attributes = self.dict()?;
         Ok(match kind {
             b"nTRN" => {
                 let (child, _, layer) = (self.i32()?, self.i32()?, self.i32()?);
-                let frames = self.count(4)?;
-                if frames > 1 {
-                    notes.add("only the first frame of animated transforms is shown");
-                }
-                let frame = if frames > 0 { self.dict()? } else { Dict::default() };
-                Node::Transform { attributes, child, layer, frame }
+                let count = self.count(4)?;
+                let frames = (0..count).map(|_| self.dict()).collect::<Result<_, _>>()?;
+                Node::Transform { attributes, child, layer, frames }
             }
             b"nGRP" => {
                 let count = self.count(4)?;
@@ -241,13 +252,11 @@ impl<'a> Cursor<'a> {
             }
             _ => {
                 let count = self.count(8)?;
-                if count > 1 {
-                    notes.add("only the first frame of animated models is shown");
-                }
                 if count == 0 {
                     return Err(Fault::malformed("a shape without a model"));
                 }
-                Node::Shape { attributes, model: self.i32()? }
+                let models = (0..count).map(|_| Ok((self.i32()?, self.dict()?))).collect::<Result<_, _>>()?;
+                Node::Shape { attributes, models }
             }
         })
     }

@@ -1,6 +1,6 @@
 //! Flattens the scene graph of a `.vox` file into placed models.
 
-use super::chunks::{Chunks, Dict, Node};
+use super::chunks::{Chunks, Dict, Node, at_frame};
 use crate::load::error::{Fault, one_line};
 use crate::load::notes::Notes;
 use crate::load::text::decode_text;
@@ -12,15 +12,38 @@ pub(super) struct Instance {
     pub(super) model: usize,
     pub(super) name: Option<String>,
     pub(super) world_from_pivot: DAffine3,
+    /// Whether the node or one above it, or a layer, is hidden.
+    pub(super) is_hidden: bool,
 }
 
-/// Walks the graph with a stack of its own. Transforms and groups may be reached once only, which leaves neither loops
-/// nor sharing that multiplies; shapes may be shared.
-pub(super) fn flatten(chunks: &Chunks<'_>, most: u64, notes: &mut Notes) -> Result<Vec<Instance>, Fault> {
+/// A node to be visited.
+struct Open {
+    node: i32,
+    world_from_parent: DAffine3,
+    name: Option<String>,
+    is_hidden: bool,
+}
+
+/// Walks the graph as it is at a frame, with a stack of its own. Transforms and groups may be reached once only, which
+/// leaves neither loops nor sharing that multiplies; shapes may be shared.
+pub(super) fn flatten(
+    chunks: &Chunks<'_>,
+    frame: u32,
+    most: u64,
+    notes: &mut Notes,
+) -> Result<Vec<Instance>, Fault> {
     let mut instances = Vec::new();
     let mut visited = HashSet::new();
-    let mut open = vec![(root(chunks, notes), DAffine3::IDENTITY, None::<String>)];
-    while let Some((id, world_from_parent, name)) = open.pop() {
+    let first = root(chunks, notes);
+    let mut open =
+        vec![Open { node: first, world_from_parent: DAffine3::IDENTITY, name: None, is_hidden: false }];
+    let mut note_frames = |count: usize| {
+        if count > 1 {
+            notes.add(format!("the file moves: frame {frame} is shown (`--frame`)"));
+        }
+    };
+    let mut senseless = false;
+    while let Some(Open { node: id, world_from_parent, name, is_hidden }) = open.pop() {
         let node =
             chunks.nodes.get(&id).ok_or_else(|| Fault::malformed(format!("node {id} is not there")))?;
         if !matches!(node, Node::Shape { .. }) && !visited.insert(id) {
@@ -28,24 +51,28 @@ pub(super) fn flatten(chunks: &Chunks<'_>, most: u64, notes: &mut Notes) -> Resu
                 "node {id} is reached twice: the scene graph is not a tree"
             )));
         }
+        let (Node::Transform { attributes, .. }
+        | Node::Group { attributes, .. }
+        | Node::Shape { attributes, .. }) = node;
+        let name = name_of(attributes).or(name);
+        let is_hidden = is_hidden || attributes.is_hidden();
         match node {
-            Node::Transform { attributes, child, layer, frame } => {
-                let layer_hidden = chunks.layers.get(layer).is_some_and(Dict::is_hidden);
-                if attributes.is_hidden() || layer_hidden {
-                    notes.add("hidden nodes and layers are left out");
-                    continue;
-                }
-                open.push((*child, world_from_parent * local(frame, notes), name_of(attributes).or(name)));
+            Node::Transform { child, layer, frames, .. } => {
+                let is_hidden = is_hidden || chunks.layers.get(layer).is_some_and(Dict::is_hidden);
+                note_frames(frames.len());
+                let placed = at_frame(frames, frame, |dict| dict).map_or(Some(DAffine3::IDENTITY), local);
+                senseless |= placed.is_none();
+                let world_from_parent = world_from_parent * placed.unwrap_or(DAffine3::IDENTITY);
+                open.push(Open { node: *child, world_from_parent, name, is_hidden });
             }
-            Node::Group { attributes, .. } if attributes.is_hidden() => {
-                notes.add("hidden nodes and layers are left out");
+            Node::Group { children, .. } => {
+                let below = |&node| Open { node, world_from_parent, name: name.clone(), is_hidden };
+                open.extend(children.iter().rev().map(below));
             }
-            Node::Group { attributes, children } => {
-                let name = name_of(attributes).or(name);
-                open.extend(children.iter().rev().map(|&child| (child, world_from_parent, name.clone())));
-            }
-            Node::Shape { attributes, model } => {
-                let known = usize::try_from(*model).ok().filter(|&m| m < chunks.models.len());
+            Node::Shape { models, .. } => {
+                note_frames(models.len());
+                let model = at_frame(models, frame, |(_, dict)| dict).map_or(-1, |(model, _)| *model);
+                let known = usize::try_from(model).ok().filter(|&m| m < chunks.models.len());
                 let Some(model) = known else {
                     let count = chunks.models.len();
                     return Err(Fault::malformed(format!(
@@ -55,10 +82,15 @@ pub(super) fn flatten(chunks: &Chunks<'_>, most: u64, notes: &mut Notes) -> Resu
                 if instances.len() as u64 >= most {
                     return Err(Fault::over(format!("more than {most} models are placed"), "instances"));
                 }
-                let name = name_of(attributes).or(name);
-                instances.push(Instance { model, name, world_from_pivot: world_from_parent });
+                instances.push(Instance { model, name, world_from_pivot: world_from_parent, is_hidden });
             }
         }
+    }
+    if senseless {
+        notes.add("a transform that makes no sense is left out");
+    }
+    if instances.iter().any(|instance| instance.is_hidden) {
+        notes.add("hidden nodes and layers are invisible objects");
     }
     Ok(instances)
 }
@@ -77,13 +109,11 @@ fn name_of(attributes: &Dict<'_>) -> Option<String> {
     (!name.is_empty()).then_some(name)
 }
 
-fn local(frame: &Dict<'_>, notes: &mut Notes) -> DAffine3 {
-    let rotation = frame.get("_r").map_or(Some(DMat3::IDENTITY), rotation_from_text);
-    let translation = frame.get("_t").map_or(Some(DVec3::ZERO), vector_from_text);
-    if rotation.is_none() || translation.is_none() {
-        notes.add("a transform that makes no sense is left out");
-    }
-    DAffine3::from_mat3_translation(rotation.unwrap_or(DMat3::IDENTITY), translation.unwrap_or(DVec3::ZERO))
+/// Returns a transform, nothing where it makes no sense.
+fn local(frame: &Dict<'_>) -> Option<DAffine3> {
+    let rotation = frame.get("_r").map_or(Some(DMat3::IDENTITY), rotation_from_text)?;
+    let translation = frame.get("_t").map_or(Some(DVec3::ZERO), vector_from_text)?;
+    Some(DAffine3::from_mat3_translation(rotation, translation))
 }
 
 /// Decodes a signed permutation: bits 0-1 and 2-3 say in which columns the first two rows have their one, bits 4 to 6

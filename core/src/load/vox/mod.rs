@@ -2,7 +2,8 @@
 //!
 //! Files have z up. Cell `(x, y, z)` of a model of `ny` rows becomes cell `(x, z, ny - 1 - y)`, a rotation, so that
 //! nothing is mirrored; the transforms of the graph are turned with it. A model turns around `floor(size / 2)`. A file
-//! without a graph shows its first model (the others are frames) with its smallest corner at the origin.
+//! without a graph shows one of its models (they are frames) with its smallest corner at the origin. What is hidden
+//! becomes an invisible object.
 //!
 //! An own reader: the crate `dot_vox` hands on sizes, counts and loops unchecked. It serves as the yardstick in tests.
 
@@ -22,13 +23,19 @@ use std::sync::Arc;
 pub(super) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
     let bytes = std::mem::take(&mut source.bytes);
     let chunks = chunks::read(&bytes, &mut source.notes)?;
+    let frame = source.options.frame;
     let instances = if chunks.nodes.is_empty() {
-        if chunks.models.len() > 1 {
-            source.notes.add(format!("only the first of {} frames is shown", chunks.models.len()));
+        let count = chunks.models.len();
+        if frame > 0 && frame as usize >= count {
+            let what = format!("there is no frame {frame}, the file has {count}");
+            return Err(Fault::unsupported(what, "ask for one of those, counted from 0"));
         }
-        chunks.models.first().map(first_frame).into_iter().collect()
+        if count > 1 {
+            source.notes.add(format!("frame {frame} of {count} is shown (`--frame`)"));
+        }
+        chunks.models.get(frame as usize).map(|model| frame_of(frame, model)).into_iter().collect()
     } else {
-        graph::flatten(&chunks, source.limits.instances, &mut source.notes)?
+        graph::flatten(&chunks, frame, source.limits.instances, &mut source.notes)?
     };
     let mut builder =
         Builder { chunks: &chunks, shapes: vec![None; chunks.models.len()], used: [false; 256], bytes: 0 };
@@ -40,7 +47,7 @@ pub(super) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
             shape,
             world_from_object: place(instance, &chunks.models[instance.model]),
             materials: Vec::new(),
-            visible: true,
+            visible: !instance.is_hidden,
             required: false,
         });
     }
@@ -53,12 +60,17 @@ pub(super) fn load(source: &mut Source<'_>) -> Result<Scene, Fault> {
 }
 
 /// Shows a model with its smallest corner at the origin.
-fn first_frame(model: &Model<'_>) -> Instance {
+fn frame_of(frame: u32, model: &Model<'_>) -> Instance {
     // `place` turns around the pivot and puts rows the other way round: take both back.
     let [x, y, z] = model.size.map(f64::from);
     let pivot = DVec3::new((x / 2.0).floor(), (y / 2.0).floor(), (z / 2.0).floor());
     let corner = DVec3::new(pivot.x, pivot.y - y, pivot.z);
-    Instance { model: 0, name: None, world_from_pivot: DAffine3::from_translation(corner) }
+    Instance {
+        model: frame as usize,
+        name: None,
+        world_from_pivot: DAffine3::from_translation(corner),
+        is_hidden: false,
+    }
 }
 
 /// Returns the transform of a model's cells: object space to the file's model space, around the pivot, through the
@@ -159,28 +171,100 @@ mod tests {
         let model = Model { size: [3, 4, 5], voxels: &[] };
         // model cell (1, 2, 3) is object cell (1, 3, 4 - 1 - 2); its middle in the file is (1.5, 2.5, 3.5)
         let middle = DVec3::new(1.5, 3.5, 1.5);
-        let at_origin = place(&first_frame(&model), &model);
+        let at_origin = place(&frame_of(0, &model), &model);
         assert_eq!(at_origin, DAffine3::IDENTITY);
         let moved = Instance {
             model: 0,
             name: None,
             world_from_pivot: DAffine3::from_translation(DVec3::new(10.0, 20.0, 30.0)),
+            is_hidden: false,
         };
         let in_file = DVec3::new(1.5, 2.5, 3.5) - DVec3::new(1.0, 2.0, 2.0) + DVec3::new(10.0, 20.0, 30.0);
         let expected = DVec3::new(in_file.x, in_file.z, -in_file.y);
         assert_eq!(place(&moved, &model).transform_point3(middle), expected);
     }
 
+    /// Writes a chunk.
+    fn chunk(kind: &[u8], content: &[u8], children: &[u8]) -> Vec<u8> {
+        let mut bytes = kind.to_vec();
+        bytes.extend((content.len() as u32).to_le_bytes());
+        bytes.extend((children.len() as u32).to_le_bytes());
+        bytes.extend(content);
+        bytes.extend(children);
+        bytes
+    }
+
+    fn dict(entries: &[(&str, &str)]) -> Vec<u8> {
+        let mut bytes = (entries.len() as u32).to_le_bytes().to_vec();
+        for text in entries.iter().flat_map(|(key, value)| [key, value]) {
+            bytes.extend((text.len() as u32).to_le_bytes());
+            bytes.extend(text.bytes());
+        }
+        bytes
+    }
+
+    fn numbers(list: &[i32]) -> Vec<u8> {
+        list.iter().flat_map(|n| n.to_le_bytes()).collect()
+    }
+
+    /// Two models of one cell; with a graph they are shown one after the other, the second from frame 5 on, 10 cells
+    /// aside from frame 7 on, in a layer.
+    fn animated(graph: bool, layer: &[(&str, &str)]) -> Vec<u8> {
+        let mut body = Vec::new();
+        for edge in [1, 2] {
+            body.extend(chunk(b"SIZE", &numbers(&[edge; 3]), &[]));
+            body.extend(chunk(b"XYZI", &[1, 0, 0, 0, 0, 0, 0, edge as u8], &[]));
+        }
+        if graph {
+            let mut place = [numbers(&[0]), dict(&[]), numbers(&[1, -1, 3, 2])].concat();
+            place.extend(dict(&[("_f", "0"), ("_t", "0 0 0")]));
+            place.extend(dict(&[("_f", "7"), ("_t", "10 0 0")]));
+            let mut shape = [numbers(&[1]), dict(&[]), numbers(&[2])].concat();
+            shape.extend([numbers(&[0]), dict(&[("_f", "0")]), numbers(&[1]), dict(&[("_f", "5")])].concat());
+            body.extend(chunk(b"nTRN", &place, &[]));
+            body.extend(chunk(b"nSHP", &shape, &[]));
+            body.extend(chunk(b"LAYR", &[numbers(&[3]), dict(layer), numbers(&[-1])].concat(), &[]));
+        }
+        [b"VOX \x96\0\0\0".to_vec(), chunk(b"MAIN", &[], &body)].concat()
+    }
+
+    fn load_frame(bytes: Vec<u8>, frame: u32) -> Result<Scene, String> {
+        let options = super::super::LoadOptions { frame, ..Default::default() };
+        let mut source = Source::open(std::path::Path::new("a.vox"), &options, bytes);
+        let mut scene = load(&mut source).map_err(|fault| fault.what())?;
+        scene.notes = source.notes.into_lines();
+        Ok(scene)
+    }
+
+    #[test]
+    fn frames_are_those_that_are_asked_for() {
+        let seen = |frame| {
+            let scene = load_frame(animated(true, &[]), frame).unwrap();
+            assert_eq!(scene.notes, [format!("the file moves: frame {frame} is shown (`--frame`)")]);
+            let bounds = scene.bounds();
+            (bounds.size().x, bounds.min.x)
+        };
+        // A cell turns around its own corner, a grid of two around its middle.
+        assert_eq!([0, 4].map(seen), [(1.0, 0.0); 2]);
+        assert_eq!([5, 6].map(seen), [(2.0, -1.0); 2]);
+        assert_eq!([7, 1000].map(seen), [(2.0, 9.0); 2]);
+        let edge = |frame| Ok(load_frame(animated(false, &[]), frame)?.bounds().size().x);
+        assert_eq!([0, 1].map(edge), [Ok(1.0), Ok(2.0)]);
+        assert_eq!(edge(2), Err("there is no frame 2, the file has 2".to_owned()));
+    }
+
+    #[test]
+    fn what_is_hidden_is_an_invisible_object() {
+        for (layer, is_shown) in [(&[][..], true), (&[("_hidden", "1")], false), (&[("_hidden", "0")], true)]
+        {
+            let scene = load_frame(animated(true, layer), 0).unwrap();
+            assert_eq!((scene.objects.len(), scene.objects[0].visible), (1, is_shown));
+            assert_eq!(scene.notes.iter().any(|note| note.contains("hidden")), !is_shown);
+        }
+    }
+
     #[test]
     fn nested_unknown_chunks_are_passed_over() {
-        let chunk = |kind: &[u8], content: &[u8], children: &[u8]| {
-            let mut bytes = kind.to_vec();
-            bytes.extend((content.len() as u32).to_le_bytes());
-            bytes.extend((children.len() as u32).to_le_bytes());
-            bytes.extend(content);
-            bytes.extend(children);
-            bytes
-        };
         let size: Vec<u8> = [2u32, 2, 2].iter().flat_map(|v| v.to_le_bytes()).collect();
         let body = [
             chunk(b"odd!", b"abc", &chunk(b"SIZE", &[0; 12], &[])),

@@ -1,11 +1,12 @@
 //! How is a scene written as a model of one representation: triangles, voxels or distances?
 
-use crate::convert::{Converter, Detail, DistanceModel, VoxelModel};
+mod vox;
+
+use crate::convert::{Converter, Detail, DistanceModel, Filling};
 use crate::math::Aabb;
 use crate::parallel::Threads;
 use crate::picture::write_whole;
-use crate::scene::{CHUNK, Material, Mesh, Object, Scene, Shape};
-use crate::shade::srgb_from_linear;
+use crate::scene::{Material, Mesh, Object, Scene, Shape};
 use glam::Vec3;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -33,7 +34,7 @@ pub struct ExportError {
 }
 
 /// Converts a scene into one model and writes it; the extension chooses the format: `.obj` and `.glb` hold
-/// triangles, `.vox` voxels, `.nrrd` signed distances.
+/// triangles, `.vox` voxels, filled as `filling` says, `.nrrd` signed distances.
 ///
 /// # Errors
 /// When the extension is unknown, nothing can be converted, a limit of the format is passed, or the file
@@ -42,6 +43,7 @@ pub fn export(
     scene: &Scene,
     path: &Path,
     detail: Detail,
+    filling: Filling,
     converter: &Converter,
     threads: &dyn Threads,
 ) -> Result<Exported, ExportError> {
@@ -58,10 +60,10 @@ pub fn export(
             (bytes, Exported { what, bound: merged.bound, notes: merged.notes })
         }
         "vox" => {
-            let (model, bound, notes) = voxel_model(scene, detail, converter, threads).map_err(&refuse)?;
-            let [x, y, z] = model.voxels.size();
-            let bytes = vox(&model).map_err(&refuse)?;
-            (bytes, Exported { what: format!("{x}x{y}x{z} voxels"), bound, notes })
+            let (grids, bound, notes) =
+                voxel_scene(scene, detail, filling, converter, threads).map_err(&refuse)?;
+            let (bytes, what) = vox::written(&grids).map_err(&refuse)?;
+            (bytes, Exported { what, bound, notes })
         }
         "nrrd" => {
             let merged = Merged::of(scene, detail, converter, threads).map_err(&refuse)?;
@@ -163,29 +165,28 @@ fn fill_missing_normals(mesh: &mut Mesh, from: usize) {
     }
 }
 
-fn voxel_model(
+/// Turns a scene into grids. Grids that lie in one lattice are kept as they are; everything else is joined to one
+/// grid.
+fn voxel_scene(
     scene: &Scene,
     detail: Detail,
+    filling: Filling,
     converter: &Converter,
     threads: &dyn Threads,
-) -> Result<(VoxelModel, f64, Vec<String>), String> {
-    // A single grid is written as it is; anything else is joined first.
-    let only_grid = match &scene.objects[..] {
-        [object] if matches!(*object.shape, Shape::Voxels(_)) => Some(object),
-        _ => None,
-    };
-    if let Some(object) = only_grid {
-        let model = converter.voxels(scene, object, detail, threads).map_err(|e| e.to_string())?;
-        return Ok(((*model).clone(), model.bound, Vec::new()));
+) -> Result<(Scene, f64, Vec<String>), String> {
+    if vox::is_lattice(scene) {
+        return Ok((scene.clone(), 0.0, Vec::new()));
     }
     let merged = Merged::of(scene, detail, converter, threads)?;
-    let model =
-        converter.voxels(&merged.scene, merged.object(), detail, threads).map_err(|e| e.to_string())?;
-    Ok(((*model).clone(), merged.bound + model.bound, merged.notes))
-}
-
-fn hex(color: Vec3) -> [u8; 3] {
-    color.to_array().map(|c| (srgb_from_linear(c) * 255.0).round() as u8)
+    let model = converter
+        .voxels_filled(&merged.scene, merged.object(), detail, filling, threads)
+        .map_err(|e| e.to_string())?;
+    let mut object = Object::new(scene.name.clone(), Shape::Voxels(model.voxels.clone()), 0);
+    object.materials = (0..model.palette.len()).collect();
+    let joined = Scene { objects: vec![object], materials: model.palette.clone(), ..Scene::default() };
+    let mut notes = merged.notes;
+    notes.push(model.why.clone());
+    Ok((joined, merged.bound + model.bound, notes))
 }
 
 /// Writes Wavefront OBJ with vertex colors instead of a material library.
@@ -267,41 +268,6 @@ fn glb(mesh: &Mesh, scene: &Scene) -> Vec<u8> {
     file.extend(b"BIN\0");
     file.extend(data);
     file
-}
-
-/// Writes MagicaVoxel's format: y up becomes z up, as the loader reads it back.
-fn vox(model: &VoxelModel) -> Result<Vec<u8>, String> {
-    let size = model.voxels.size();
-    if size.iter().any(|&s| s > 256) {
-        let [x, y, z] = size;
-        return Err(format!("{x}x{y}x{z} voxels do not fit .vox (256 along an axis): lower --resolution"));
-    }
-    const { assert!(CHUNK <= 256) };
-    let mut voxels = Vec::new();
-    model.voxels.for_each_filled(|[x, y, z], value| {
-        voxels.push(dot_vox::Voxel { x: x as u8, y: (size[2] - 1 - z) as u8, z: y as u8, i: value - 1 });
-    });
-    let mut palette: Vec<dot_vox::Color> = model
-        .palette
-        .iter()
-        .map(|m| {
-            let [r, g, b] = hex(m.base_color);
-            dot_vox::Color { r, g, b, a: 255 }
-        })
-        .collect();
-    palette.resize(256, dot_vox::Color { r: 0, g: 0, b: 0, a: 255 });
-    let data = dot_vox::DotVoxData {
-        version: 150,
-        index_map: Vec::new(),
-        models: vec![dot_vox::Model { size: dot_vox::Size { x: size[0], y: size[2], z: size[1] }, voxels }],
-        palette,
-        materials: Vec::new(),
-        scenes: Vec::new(),
-        layers: Vec::new(),
-    };
-    let mut bytes = Vec::new();
-    data.write_vox(&mut bytes).map_err(|e| e.to_string())?;
-    Ok(bytes)
 }
 
 /// Writes nearly raw raster data: signed distances as 32-bit floats, x fastest.
