@@ -16,7 +16,7 @@
 //! ```
 
 pub use polyptych_core::{
-    camera, convert, framebuffer, load, math, metrics, parallel, scene, seam, shade, stream,
+    camera, convert, framebuffer, load, math, metrics, parallel, pixels, scene, seam, shade, stream,
 };
 
 pub mod animate;

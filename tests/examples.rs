@@ -2,6 +2,8 @@
 
 #[path = "../examples/choose_a_backend.rs"]
 mod choose_a_backend;
+#[path = "../examples/own_pixels.rs"]
+mod own_pixels;
 #[path = "../examples/write_a_backend.rs"]
 mod write_a_backend;
 
@@ -19,4 +21,13 @@ fn a_back_end_is_written_in_one_file_and_draws() {
     let middle = picture.get_pixel(240, 150);
     let corner = picture.get_pixel(2, 2);
     assert_ne!(middle, corner, "something is drawn in the middle");
+}
+
+#[test]
+fn pixels_go_to_a_screen_of_ones_own() {
+    own_pixels::main().unwrap();
+    let file = std::fs::read("out/own_pixels.ppm").unwrap();
+    let pixels = file.strip_prefix(b"P6 90 60 255\n").unwrap();
+    assert_eq!(pixels.len(), 90 * 60 * 3);
+    assert!(pixels.iter().collect::<std::collections::HashSet<_>>().len() > 20, "a picture of many shades");
 }

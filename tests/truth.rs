@@ -3,7 +3,7 @@
 mod common;
 
 use common::{model, models};
-use polyptych::convert::{Converter, Detail};
+use polyptych::convert::{Converter, Detail, Filling};
 use polyptych::parallel::OneThread;
 use polyptych::prelude::*;
 use std::f64::consts::PI;
@@ -179,6 +179,22 @@ fn shells_of_closed_meshes_stop_every_flood_and_enclose_their_volume() {
                 );
                 let volume = mesh.volume().abs();
                 assert!(full <= volume && volume <= full + shell, "{file} at {resolution}: {full}, {volume}");
+                let [thin, solid] = [Filling::Thin, Filling::Solid].map(|filling| {
+                    let converter = Converter::default();
+                    converter
+                        .voxels_filled(&scene, object, detail, filling, &OneThread)
+                        .unwrap()
+                        .voxels
+                        .clone()
+                });
+                // What is thin stops water over faces only, with fewer cells.
+                assert!(thin.filled() < model.voxels.filled() * 7 / 10, "{file} at {resolution}");
+                assert!(
+                    dry(&thin, false) > through_faces,
+                    "{file} at {resolution}: water comes in over faces"
+                );
+                let off = (solid.filled() as f64 * cell - volume).abs();
+                assert!(off < 0.03 * area * cell.cbrt(), "{file} at {resolution}: a volume off by {off}");
                 assert!(shell <= 2.0 * area * bound, "{file} at {resolution}: a shell of {shell}");
             } else {
                 assert!(shell > 0.0, "{file} at {resolution}: an open mesh is its surface");

@@ -17,6 +17,7 @@ pub mod load;
 pub mod math;
 pub mod metrics;
 pub mod parallel;
+pub mod pixels;
 pub mod scene;
 pub mod seam;
 pub mod shade;

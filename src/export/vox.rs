@@ -33,7 +33,7 @@ pub(super) fn written(scene: &Scene) -> Result<(Vec<u8>, String), String> {
     let mut body = Vec::new();
     let (mut placed, mut models) = (Vec::new(), 0);
     // Models of a shape, and where each begins; instances share them.
-    let mut known: HashMap<(usize, &[usize]), Vec<(i32, [u32; 3], [u32; 3])>> = HashMap::new();
+    let mut known: HashMap<(usize, &[usize]), Vec<Part>> = HashMap::new();
     let mut what = Vec::new();
     for object in &scene.objects {
         let Shape::Voxels(voxels) = &*object.shape else { continue };
@@ -87,6 +87,9 @@ pub(super) fn written(scene: &Scene) -> Result<(Vec<u8>, String), String> {
     let models = if models > 1 { format!(" in {models} models") } else { String::new() };
     Ok((file, format!("{what} voxels{models}")))
 }
+
+/// A model of a grid: its number, first cell and size.
+type Part = (i32, [u32; 3], [u32; 3]);
 
 /// Cuts a grid into blocks that fit a model: first cells and sizes.
 fn blocks(size: [u32; 3]) -> impl Iterator<Item = ([u32; 3], [u32; 3])> {
@@ -145,13 +148,13 @@ fn frame(object: &Object, from: [u32; 3], size: [u32; 3]) -> Option<(u8, [i32; 3
     let near = |v: f64, whole: f64| (v - whole).abs() < 1e-6;
     let mut code = 0;
     let mut columns = [0; 3];
-    for row in 0..3 {
+    for (row, place) in columns.iter_mut().enumerate() {
         let values = matrix.row(row).to_array();
         let column = values.iter().position(|v| near(v.abs(), 1.0))?;
         if values.iter().enumerate().any(|(i, &v)| i != column && !near(v, 0.0)) {
             return None;
         }
-        columns[row] = column;
+        *place = column;
         code |= if values[column] < 0.0 { 1 << (4 + row) } else { 0 };
     }
     let is_whole = place.to_array().iter().all(|&v| near(v, v.round()) && v.abs() < 1e9);
@@ -258,6 +261,9 @@ fn properties(material: &Material) -> Vec<(&'static str, String)> {
     }
     if material.opacity < 1.0 {
         let clear = number(1.0 - material.opacity.max(0.0));
+        if metal == 0.0 && material.specular > 0.0 {
+            return vec![("_type", "_glass".to_owned()), ("_trans", clear.clone()), ("_alpha", clear)];
+        }
         return vec![
             ("_type", "_blend".to_owned()),
             ("_trans", clear.clone()),

@@ -1,5 +1,6 @@
 //! What is counted in a case?
 
+pub(super) use super::steady::Way;
 use super::{draw, draw_measured, scenes::Setup, steady};
 use crate::compare::REFERENCE;
 use crate::framebuffer::{Channel, Framebuffer};
@@ -42,7 +43,7 @@ pub(super) enum Count {
     /// Share of the reference's objects that are not seen.
     Missing,
     /// Share of the cells within a shell of voxels that water from outside reaches.
-    Flood,
+    Flood(Way),
     /// Pixels that change from frame to frame beyond the reference's own, as a share of those.
     Toggles,
     /// Pixels whose shadow comes or goes, in the same way.
@@ -105,7 +106,7 @@ impl Count {
             Self::EditedMidway => return steady::edited_midway(studio, backend, own),
             Self::Threads => return steady::threaded(studio, backend, own),
             Self::Roots => return steady::roots_missed(studio, trial),
-            Self::Flood => return steady::flooded(studio, trial),
+            Self::Flood(way) => return steady::flooded(studio, trial, way),
             _ => {}
         }
         let (picture, ms) = draw(studio, backend, own)?;

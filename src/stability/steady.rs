@@ -151,9 +151,9 @@ pub(super) fn objects_missed(picture: &Framebuffer, reference: &Framebuffer) -> 
     all.difference(&own).count() as f64 / all.len().max(1) as f64
 }
 
-/// Lets water into the voxels of a back end's model from outside, through faces, edges and corners of cells. Returns the share
+/// Lets water into the voxels of a back end's model from outside, through some sides of cells. Returns the share
 /// of the cells inside that get wet; those inside lie nearer to the origin than one, by two cells.
-pub(super) fn flooded(studio: &mut Studio, trial: &Trial<'_>) -> Result<Drawn, StudioError> {
+pub(super) fn flooded(studio: &mut Studio, trial: &Trial<'_>, way: Way) -> Result<Drawn, StudioError> {
     let (picture, ms) = draw(studio, trial.backend, &trial.own)?;
     let model = studio.renderer(trial.backend)?.model();
     let grid = model.as_ref().and_then(|scene| scene.objects.first()).and_then(|o| match &*o.shape {
@@ -161,7 +161,7 @@ pub(super) fn flooded(studio: &mut Studio, trial: &Trial<'_>) -> Result<Drawn, S
         _ => None,
     });
     let error = grid.map_or(0.0, |(voxels, world_from_cells)| {
-        let wet = flood(voxels);
+        let wet = flood(voxels, way);
         let edge = world_from_cells.matrix3.determinant().abs().cbrt();
         let (mut inside, mut reached) = (0u32, 0u32);
         for (i, &wet) in wet.iter().enumerate() {
@@ -181,8 +181,17 @@ fn cell_of(voxels: &Voxels, index: usize) -> [u32; 3] {
     [index % nx, index / nx % ny, index / (nx * ny)].map(|c| c as u32)
 }
 
+/// Where water passes from cell to cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    /// Through faces.
+    Faces,
+    /// Through faces, edges and corners.
+    Corners,
+}
+
 /// Marks the empty cells that are reached from the border.
-fn flood(voxels: &Voxels) -> Vec<bool> {
+fn flood(voxels: &Voxels, way: Way) -> Vec<bool> {
     let size = voxels.size();
     let mut wet = vec![false; size.iter().map(|&s| s as usize).product()];
     let index = |c: [u32; 3]| ((c[2] * size[1] + c[1]) * size[0] + c[0]) as usize;
@@ -194,6 +203,9 @@ fn flood(voxels: &Voxels) -> Vec<bool> {
     while let Some(cell) = queue.pop() {
         for k in 0..27u32 {
             let step = [k % 3, k / 3 % 3, k / 9];
+            if way == Way::Faces && step.iter().filter(|s| **s != 1).count() > 1 {
+                continue;
+            }
             let next: [u32; 3] = std::array::from_fn(|a| (cell[a] + step[a]).wrapping_sub(1));
             if (0..3).all(|a| next[a] < size[a]) && !wet[index(next)] && is_empty(next) {
                 wet[index(next)] = true;

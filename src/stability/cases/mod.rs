@@ -37,9 +37,9 @@
 //! | far away, long ways, caps on steps | `far-voxels`, `long-grids` |
 //! | edits, also in the middle of a frame | `edits`, `edits-midway` |
 //! | reflections cut off | `mirrors` |
-//! | conversion: watertight for 6 and 26 neighbors | `floods` (what stops water at corners stops it at faces) |
+//! | conversion: watertight for 6 and 26 neighbors | `floods` (what stops water at corners stops it at faces), `thin-floods` |
 //! | conversion: open, turned over, needles, another order | `open-meshes`, `turned-triangles`, `warped-quads`, `triangle-order` |
-//! | conversion: volume to the closed form | `core/src/convert/voxelize.rs`: no back end draws a volume in cubic meters |
+//! | conversion: volume to the closed form | `core/src/convert/voxelize/tests.rs`: no back end draws a volume in cubic meters |
 //!
 //! | free forms | case |
 //! |---|---|

@@ -1,6 +1,6 @@
 //! Which cases are about grids of voxels, and about what is turned into grids?
 
-use super::super::count::Count;
+use super::super::count::{Count, Way};
 use super::super::scenes::{HEIGHT, Setup, look, perspective, setup, studio};
 use super::{Case, base, powers};
 use crate::camera::{Camera, Projection};
@@ -87,7 +87,20 @@ pub(super) fn cases() -> Vec<Case> {
             is_promise: true,
             backends: &["voxel"],
             build: hollow_ball,
-            count: Count::Flood,
+            count: Count::Flood(Way::Corners),
+            ..base()
+        },
+        Case {
+            id: "thin-floods",
+            title: "The same ball as the fewest voxels that stop water over faces",
+            parameter: "cells along an edge",
+            values: vec![16.0, 23.0, 32.0, 47.0, 64.0, 97.0, 128.0],
+            limit: 0.0,
+            counted: "share of the cells inside that water reaches through faces of cells",
+            is_promise: true,
+            backends: &["voxel"],
+            build: thin_ball,
+            count: Count::Flood(Way::Faces),
             ..base()
         },
         Case {
@@ -235,6 +248,12 @@ fn hollow_ball(cells: f64) -> Setup {
     let mut setup = setup(scene, look(DVec3::new(1.0, 1.5, 4.0), DVec3::ZERO, 0.7));
     setup.need.tolerance_px = 1e-3;
     setup.settings.push(("detail.resolution", format!("{cells:.0}")));
+    setup
+}
+
+fn thin_ball(cells: f64) -> Setup {
+    let mut setup = hollow_ball(cells);
+    setup.settings.push(("detail.filling", "thin".to_owned()));
     setup
 }
 

@@ -35,11 +35,13 @@ impl Crossing {
     }
 }
 
-/// Calls `visit` for each line along an axis through cells of a box that crosses a triangle.
+/// Calls `visit` for each line along an axis through cells of a box that crosses a triangle, or misses it by less than a
+/// margin, in cells: with one, corners that only rounding keeps apart leave no crack.
 pub(super) fn for_each_crossing(
     corners: [DVec3; 3],
     axis: usize,
     cells: &[Range<u32>; 3],
+    margin: f64,
     visit: &mut impl FnMut(Crossing),
 ) {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -47,12 +49,12 @@ pub(super) fn for_each_crossing(
     let most = |a: usize| corners[0][a].max(corners[1][a]).max(corners[2][a]);
     // Lines from `low` on, up to but not including `high`.
     let span = |a: usize, low: f64, high: f64| {
-        let from = low.ceil().max(f64::from(cells[a].start)) as u32;
-        from..(high.ceil().clamp(0.0, f64::from(cells[a].end)) as u32).max(from)
+        let from = (low - margin).ceil().max(f64::from(cells[a].start)) as u32;
+        from..((high + margin).ceil().clamp(0.0, f64::from(cells[a].end)) as u32).max(from)
     };
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     for row in span(v, least(v), most(v)) {
-        let height = f64::from(row);
+        let height = f64::from(row).min(most(v).next_down()).max(least(v));
         let (mut rising, mut falling) = (None, None);
         for i in 0..3 {
             let (from, to) = (corners[i], corners[(i + 1) % 3]);
@@ -73,7 +75,7 @@ pub(super) fn for_each_crossing(
             // A sliver may be seen from its edge, where rounding tells.
             let along = if along.is_finite() { along.clamp(least(axis), most(axis)) } else { least(axis) };
             let mut line = [0.0; 3];
-            (line[u], line[v]) = (across, height);
+            (line[u], line[v]) = (across, f64::from(row));
             visit(Crossing { line, axis, along, sign });
         }
     }
@@ -82,6 +84,28 @@ pub(super) fn for_each_crossing(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Two triangles whose common edge, on the very lines, is a rounding apart.
+    #[test]
+    fn a_margin_closes_cracks() {
+        let cells = [0..9, 0..9, 0..9];
+        let at = |x: f64, y: f64| DVec3::new(x, y, 4.25);
+        let apart = 1e-12;
+        let halves = [
+            [at(1.0 + apart, 1.0), at(7.0, 1.0), at(7.0, 7.0 - apart)],
+            [at(1.0, 1.0), at(7.0, 7.0), at(1.0, 7.0)],
+        ];
+        for (margin, whole) in [(0.0, false), (1e-9, true)] {
+            let mut found = [0; 9];
+            for half in halves {
+                for_each_crossing(half, 2, &cells, margin, &mut |crossing| {
+                    let [x, y, _] = crossing.cell(0);
+                    found[x as usize] += i32::from(x == y);
+                });
+            }
+            assert_eq!((2..7).all(|i| found[i] > 0), whole, "{margin}: {found:?}");
+        }
+    }
 
     /// Whichever way a square of corners on the very lines is cut, each line crosses it once.
     #[test]
@@ -97,11 +121,17 @@ mod tests {
                 let square = [place(1.0, 2.0), place(6.0, 2.0), place(6.0, 7.0), place(1.0, 7.0)];
                 let mut found = [[0; 9]; 9];
                 for [a, b, c] in [[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]][cut] {
-                    for_each_crossing([square[a], square[b], square[c]], axis, &cells, &mut |crossing| {
-                        let cell = crossing.cell(0);
-                        assert_eq!((crossing.along, crossing.sign), (4.25, 1));
-                        found[cell[(axis + 1) % 3] as usize][cell[(axis + 2) % 3] as usize] += 1;
-                    });
+                    for_each_crossing(
+                        [square[a], square[b], square[c]],
+                        axis,
+                        &cells,
+                        0.0,
+                        &mut |crossing| {
+                            let cell = crossing.cell(0);
+                            assert_eq!((crossing.along, crossing.sign), (4.25, 1));
+                            found[cell[(axis + 1) % 3] as usize][cell[(axis + 2) % 3] as usize] += 1;
+                        },
+                    );
                 }
                 for (x, column) in found.iter().enumerate() {
                     for (y, &count) in column.iter().enumerate() {

@@ -2,7 +2,7 @@
 //!
 //! The winding number of a point is the mean, over all directions, of how often rays from it leave the mesh less how
 //! often they enter it. For a closed mesh all directions say the same. Here the six along the axes are asked, which
-//! three sweeps over the grid answer for all cells; where a mesh is open, three of them must agree.
+//! three sweeps over the grid answer for all cells; where a mesh is open, most of them must agree.
 //!
 //! Source: A. Jacobson, L. Kavan, O. Sorkine-Hornung, *Robust Inside-Outside Segmentation using Generalized Winding
 //! Numbers*, SIGGRAPH 2013. We deviate in the six directions.
@@ -12,8 +12,9 @@ use super::slab::Slab;
 use super::surface::{Surface, triangles_of_slabs};
 use crate::parallel::{Threads, for_each_mut};
 
-/// Directions that must call a middle inside.
-const ENOUGH: i32 = 3;
+/// Directions that must call a middle inside. With three, a line that grazes the rim of one hole and leaves by another
+/// would do.
+const ENOUGH: i32 = 4;
 
 /// Fills the cells whose middles are inside. They have the color of the surface beside them, and within the body that
 /// of the surface before them in their row.
@@ -56,7 +57,7 @@ fn for_each_in(
     let [nx, ny, _] = surface.grid.size;
     let cells = [0..nx, 0..ny, slab.from..slab.to];
     for &t in triangles {
-        for_each_crossing(surface.corners(t as usize), axis, &cells, &mut |c| visit(t as usize, c));
+        for_each_crossing(surface.corners(t as usize), axis, &cells, 0.0, &mut |c| visit(t as usize, c));
     }
 }
 
@@ -99,8 +100,8 @@ fn inside(surface: &Surface<'_>, slab: &Slab, triangles: &[u32], [below, all]: [
                 for k in 0..size[axis] {
                     let at = begin + k * stride[axis];
                     behind += std::mem::take(&mut steps[at]);
-                    // Those ahead less those behind.
-                    votes[at] += total - 2 * behind;
+                    // One vote for what lies ahead, and one for what lies behind.
+                    votes[at] += (total - behind).signum() - behind.signum();
                 }
             }
         }

@@ -54,6 +54,10 @@ pub(super) fn fill_touched(surface: &Surface<'_>, slabs: &mut [Slab], threads: &
     fill_each(surface, slabs, threads, fill_triangle);
 }
 
+/// Cracks that are narrower, in cells, are closed: corners that ought to be one may differ by a rounding of their 32 bits,
+/// which is a hundred-thousandth of a cell in a grid of some hundred.
+const CRACK: f64 = 1e-4;
+
 /// Fills the cells in which a triangle meets one of the three lines through their middles along the axes. A way over
 /// faces of cells goes from middle to middle along such lines, so that it must go through one of these cells.
 ///
@@ -83,7 +87,7 @@ fn cross_triangle(surface: &Surface<'_>, t: usize, slab: &mut Slab) {
     let corners = surface.corners(t);
     for axis in 0..3 {
         let cells = [0..nx, 0..ny, own.clone()];
-        for_each_crossing(corners, axis, &cells, &mut |crossing| {
+        for_each_crossing(corners, axis, &cells, CRACK, &mut |crossing| {
             let [x, y, z] = crossing.cell((crossing.along + 0.5).floor() as i64);
             let near = |c: i64, count: u32| c.clamp(0, i64::from(count) - 1) as u32;
             let cell = [near(x, nx), near(y, ny), near(z, nz)];

@@ -76,18 +76,18 @@ pub(super) fn with_included<T>(
     source: &mut Source<'_>,
     read: impl FnOnce(&mut Source<'_>) -> Result<T, Fault>,
 ) -> Result<T, Fault> {
-    with_included_options(file, source, LoadOptions::default(), read)
+    with_included_options(file, source, &LoadOptions::default(), read)
 }
 
 /// The same, with what the scene file says about the file.
 pub(super) fn with_included_options<T>(
     file: &str,
     source: &mut Source<'_>,
-    options: LoadOptions,
+    options: &LoadOptions,
     read: impl FnOnce(&mut Source<'_>) -> Result<T, Fault>,
 ) -> Result<T, Fault> {
     let path = source.folder.find(file)?;
-    let options = LoadOptions { height_map: true, limits: source.limits.clone(), ..options };
+    let options = LoadOptions { height_map: true, limits: source.limits.clone(), ..options.clone() };
     let mut inner = Source::open(&path, &options, source.folder.read(file)?);
     let made = read(&mut inner).map_err(|fault| fault.at(format_args!("`{}`", one_line(file))));
     for line in inner.notes.into_lines() {
@@ -252,7 +252,7 @@ impl Builder {
 
     fn read_model(&mut self, file: &str, frame: u32, source: &mut Source<'_>) -> Result<Vec<Object>, Fault> {
         let options = LoadOptions { frame, ..LoadOptions::default() };
-        let mut model = with_included_options(file, source, options, |inner| {
+        let mut model = with_included_options(file, source, &options, |inner| {
             let is_model = matches!(inner.extension.as_str(), "obj" | "gltf" | "glb" | "stl" | "ply" | "vox");
             if !is_model {
                 let what = format!("files `.{}` are no models", one_line(&inner.extension));

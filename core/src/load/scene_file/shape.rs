@@ -244,7 +244,7 @@ fn volume_of(entry: &VolumeEntry, source: &mut Source<'_>) -> Result<(Volume, DA
     let (mut volume, turned) = match (&entry.file, &entry.samples, format) {
         (Some(file), None, volume) => {
             let options = LoadOptions { volume, ..LoadOptions::default() };
-            super::read::with_included_options(file, source, options, volume::read)?
+            super::read::with_included_options(file, source, &options, volume::read)?
         }
         (None, Some(samples), Some(format)) => {
             (inline_volume(samples, format, source.limits)?, DAffine3::IDENTITY)

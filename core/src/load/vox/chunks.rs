@@ -59,7 +59,7 @@ pub(super) enum Node<'a> {
 
 /// Returns what holds at a frame: the last that begins at it or before, else the first. What does not name its frame
 /// (`_f`) has that of its place in the list.
-pub(super) fn at_frame<'b, T>(list: &'b [T], frame: u32, dict: impl Fn(&T) -> &Dict<'_>) -> Option<&'b T> {
+pub(super) fn at_frame<T>(list: &[T], frame: u32, dict: impl Fn(&T) -> &Dict<'_>) -> Option<&T> {
     let begins = |i: usize, item: &T| dict(item).number("_f").unwrap_or(i as f32);
     let begun = list.iter().enumerate().filter(|(i, item)| begins(*i, item) <= frame as f32);
     // Of equals the first.
