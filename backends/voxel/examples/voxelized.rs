@@ -1,7 +1,8 @@
 //! What does a model look like as voxels, and how long does it take? Draws a model at a resolution of your choice.
 //!
-//! `cargo run --release -p polyptych-voxel --example voxelized -- MODEL CELLS OUT.png [EYE TARGET UP]`: a bunny at
-//! 48, a statue at 256, a building at 512. `EYE`, `TARGET` and `UP` are `x,y,z` in the model's own units and axes.
+//! `cargo run --release -p polyptych-voxel --example voxelized -- MODEL CELLS OUT.png [EYE TARGET UP]
+//! [NAME=VALUE...]`: a bunny at 48, a statue at 256, a building at 512. `EYE`, `TARGET` and `UP` are `x,y,z` in the model's
+//! own units and axes; the rest are parameters of the back end, such as `detail.filling=solid` or `detail.blocks=true`.
 
 use glam::DVec3;
 use polyptych_core::camera::{Camera, Projection};
@@ -28,13 +29,14 @@ fn place(text: &str) -> Result<DVec3, Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let words: Vec<String> = std::env::args().skip(1).collect();
+    let (settings, words): (Vec<String>, Vec<String>) =
+        std::env::args().skip(1).partition(|word| word.contains('='));
     let (model, cells, out, view) = match &words[..] {
         [model, cells, out] => (model, cells, out, None),
         [model, cells, out, eye, target, up] => {
             (model, cells, out, Some((place(eye)?, place(target)?, place(up)?)))
         }
-        _ => return Err("MODEL CELLS OUT.png [EYE TARGET UP]".into()),
+        _ => return Err("MODEL CELLS OUT.png [EYE TARGET UP] [NAME=VALUE...]".into()),
     };
     let mut scene = load(Path::new(model), &LoadOptions::default())?;
     let bounds = scene.bounds();
@@ -58,6 +60,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     need.channels = Channels::NONE.with(Channel::Color);
     let mut voxel = Voxel::new();
     need.settings.set("voxel", &voxel.info().parameters.clone(), "detail.resolution", cells)?;
+    for setting in &settings {
+        let (name, value) = setting.split_once('=').unwrap_or_default();
+        need.settings.set("voxel", &voxel.info().parameters.clone(), name, value)?;
+    }
 
     let pool = Pool::new(0)?;
     let control = Control::new(&pool);

@@ -15,11 +15,14 @@
 //! leaves in doubt taken in double; what goes on through glass, or comes from a mirror, goes alone. The parameter `walk`
 //! chooses other numbers.
 //!
+//! Where it is asked for, blocks of cells that are no larger than a pixel are drawn as one; see `levels`.
+//!
 //! Colors are the mean of as many samples as are needed; all else is that of the ray through a pixel's middle.
 
 mod beam;
 mod grid;
 mod lamps;
+mod levels;
 mod light;
 mod model;
 mod occupancy;

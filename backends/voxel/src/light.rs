@@ -66,7 +66,7 @@ impl Tracer<'_> {
             if material.texture.is_none() && !mirrors && material.effective_opacity(material.opacity) >= 1.0 {
                 points.plain.0[i] = u32::MAX;
                 points.materials[i] = Some(material);
-                points.color.set(i, material.base_color);
+                points.color.set(i, item.color_of(octet.cell(i)).unwrap_or(material.base_color));
             }
         }
         points

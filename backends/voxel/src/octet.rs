@@ -4,6 +4,7 @@
 //! holes, a ray that began in a cell, a grid too long for single precision) is asked of them, ray by ray.
 
 use crate::beam::Span;
+use crate::levels::Footprint;
 use crate::walk::packet::{GridRays, Packet, Stretch};
 use crate::world::{Counts, LIFT, Met, Place, Reach, Site, World};
 use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
@@ -119,6 +120,16 @@ impl Octet {
         })
     }
 
+    /// Returns the cell whose surface a pixel sees.
+    pub(crate) fn cell(&self, lane: usize) -> [i32; 3] {
+        let mut cell = [self.before[0].0[lane], self.before[1].0[lane], self.before[2].0[lane]];
+        if !self.began_inside.has(lane) {
+            let face = usize::from(self.face[lane]);
+            cell[face / 2] += if face.is_multiple_of(2) { 1 } else { -1 };
+        }
+        cell
+    }
+
     fn put(&mut self, lane: usize, met: &Met) {
         self.t.0[lane] = met.place.t;
         self.item[lane] = met.place.item as u32;
@@ -145,13 +156,20 @@ impl Octet {
 impl World {
     /// Finds the first surfaces that rays from the eye meet, among what their tile can reach.
     #[inline(always)]
-    pub(crate) fn meet_octet(&self, octet: &mut Octet, reach: &Reach, bytes: Bytes, counts: &Counts) {
+    pub(crate) fn meet_octet(
+        &self,
+        octet: &mut Octet,
+        reach: &Reach,
+        (bytes, footprint): (Bytes, &Footprint),
+        counts: &Counts,
+    ) {
         let rays = octet.rays;
         for (index, span) in reach.grids.iter().flatten() {
             let (index, item) = (*index, &self.items[*index as usize]);
             let layer = &item.grid.seen;
+            let [begins, ends] = item.range(&self.items, footprint);
             let Some(order) = self.walk.order().filter(|_| Packet::can(layer.size)) else {
-                self.meet_each(octet, index, span, rays.there, counts);
+                self.meet_each(octet, index, span, (rays.there, [begins, ends]), counts);
                 continue;
             };
             let map = &item.grid_from_world;
@@ -159,20 +177,29 @@ impl World {
             let grid_rays = GridRays::new(origin, rays.direction.turned(&map.matrix3), rays.there);
             let (from, to) = span.eight_distances(&grid_rays);
             // Just before the plane: where a ray is then is beyond doubt.
-            let from = from * F64x8::splat(1.0 - 1e-9);
-            let to = minimum(to, octet.t);
+            let from = (from * F64x8::splat(1.0 - 1e-9)).max(F64x8::splat(begins));
+            let to = minimum(minimum(to, octet.t), F64x8::splat(ends));
             let mut packet = Packet::begin(&grid_rays, layer.size, &Stretch { from, to });
-            let hits = packet.find_marked(&grid_rays, layer, order);
+            let mut hits = packet.find_marked(&grid_rays, layer, order);
             counts.steps.set(counts.steps.get() + u64::from(packet.steps));
+            if begins > 0.0 && hits.marked != 0 {
+                let within = mask_of(hits.marked) & packet.begun_in();
+                if within.any() {
+                    for lane in (0..LANES).filter(|&lane| within.has(lane)) {
+                        hits.marked &= !(1 << lane);
+                    }
+                    self.meet_each(octet, index, span, (within, [begins, ends]), counts);
+                }
+            }
             if hits.marked != 0 {
                 if item.without_holes {
                     self.take(octet, &grid_rays, &packet, index, mask_of(hits.marked), bytes);
                 } else {
-                    self.meet_each(octet, index, span, mask_of(hits.marked), counts);
+                    self.meet_each(octet, index, span, (mask_of(hits.marked), [begins, ends]), counts);
                 }
             }
             if packet.refused.any() {
-                self.meet_each(octet, index, span, packet.refused, counts);
+                self.meet_each(octet, index, span, (packet.refused, [begins, ends]), counts);
             }
         }
     }
@@ -180,11 +207,24 @@ impl World {
     /// Asks ray by ray.
     #[cold]
     #[inline(never)]
-    fn meet_each(&self, octet: &mut Octet, index: u32, span: &Span, asked: Mask8, counts: &Counts) {
+    fn meet_each(
+        &self,
+        octet: &mut Octet,
+        index: u32,
+        span: &Span,
+        (asked, [begins, ends]): (Mask8, [f64; 2]),
+        counts: &Counts,
+    ) {
+        let is_coarse = self.items[index as usize].colors.is_some();
         for lane in (0..LANES).filter(|&lane| asked.has(lane)) {
             let old = octet.met(lane);
-            if let Some(new) =
-                self.meet_grid(index as usize, span, &octet.rays.one(lane), octet.t.0[lane], counts)
+            let (ray, before) = (octet.rays.one(lane), octet.t.0[lane].min(ends));
+            let met = if is_coarse {
+                self.meet_coarse(index as usize, &ray, [begins, before], counts)
+            } else {
+                self.meet_grid(index as usize, span, &ray, before, counts)
+            };
+            if let Some(new) = met
                 && old.as_ref().is_none_or(|old| new.place < old.place)
             {
                 octet.put(lane, &new);

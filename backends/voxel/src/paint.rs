@@ -1,6 +1,7 @@
 //! A picture, tile by tile: what can the rays of a tile meet, what do they meet, and what color is it?
 
 use crate::beam::Bundle;
+use crate::levels::Footprint;
 use crate::octet::{Bytes, NOTHING, Octet, Rays};
 use crate::trace::{Shadows, Tracer, Wants, finite};
 use crate::world::{LIFT, Reach, World};
@@ -30,6 +31,8 @@ pub(crate) struct Painter<'a> {
     place: DVec2,
     /// How many rays a pixel's color is the mean of.
     samples: u32,
+    /// How large pixels are, where blocks of cells may stand for them.
+    footprint: Footprint,
 }
 
 /// Which pixels are drawn.
@@ -147,7 +150,13 @@ fn wants(channels: Channels) -> Wants {
 }
 
 impl<'a> Painter<'a> {
-    pub(crate) fn new(camera: &'a Camera, target: &Framebuffer, pattern: Pattern, samples: u32) -> Self {
+    pub(crate) fn new(
+        camera: &'a Camera,
+        target: &Framebuffer,
+        pattern: Pattern,
+        samples: u32,
+        footprint: Footprint,
+    ) -> Self {
         Self {
             view: camera.view(target.width(), target.height()),
             is_straight: matches!(
@@ -159,6 +168,7 @@ impl<'a> Painter<'a> {
             pattern,
             place: DVec2::splat(0.5),
             samples,
+            footprint,
         }
     }
 
@@ -319,7 +329,7 @@ impl<'a> Painter<'a> {
             tile.pixels().filter_map(|(_, x, row)| self.ray(tile, x, row)).for_each(&mut add);
         }
         let bundle = Bundle { origins, directions: &directions[..count] };
-        tracer.world.reach(&bundle, |grid| &grid.seen)
+        tracer.world.reach(&bundle, |grid| &grid.seen, &self.footprint)
     }
 
     /// Draws a tile that sees nothing but background.
@@ -379,7 +389,7 @@ impl<'a> Painter<'a> {
             let there = there & Mask8::first((tile.columns - column).div_ceil(stride) as usize);
             seen += u64::from(there.count());
             octet.rays = Rays { origin, direction, there };
-            tracer.world.meet_octet(octet, reach, bytes, &tracer.counts);
+            tracer.world.meet_octet(octet, reach, (bytes, &self.footprint), &tracer.counts);
             if bytes == Bytes::Read {
                 sites.add(tracer.world, octet);
             }
@@ -404,7 +414,7 @@ impl<'a> Painter<'a> {
         for (light, lamp) in lights.iter_mut().zip(&tracer.world.lamps) {
             let Some(direction) = lamp.direction().filter(|_| lamp.is_blocked) else { continue };
             let bundle = Bundle { origins: sites, directions: &[direction] };
-            *light = tracer.world.reach(&bundle, |grid| &grid.blocking);
+            *light = tracer.world.reach(&bundle, |grid| &grid.blocking, &Footprint::NONE);
         }
         lights
     }

@@ -2,6 +2,7 @@
 
 use crate::grid::{Chunks, Grid};
 use crate::lamps::Lamp;
+use crate::levels::{self, Coarse, Footprint};
 use crate::model::{self, Model};
 use crate::occupancy::Values;
 use crate::paint::{Painter, Pattern, TILE};
@@ -69,6 +70,8 @@ struct Ready {
     chunks_built: u64,
     checkerboard: bool,
     samples: u32,
+    /// Whether blocks of cells may stand for them.
+    is_coarse: bool,
 }
 
 impl Default for Voxel {
@@ -134,6 +137,39 @@ impl Voxel {
     }
 }
 
+/// Makes the coarser grids of items that may have any, and says so of their objects.
+fn levels_of(
+    model: &mut Model,
+    items: &[Item],
+    control: &Control<'_>,
+) -> Result<Vec<(usize, [Coarse; 2])>, RenderError> {
+    let mut levels = Vec::new();
+    let mut known: HashMap<(usize, Vec<usize>), [Coarse; 2]> = HashMap::new();
+    for (index, item) in items.iter().enumerate() {
+        control.check()?;
+        let object = &model.scene.objects[item.object];
+        let decision = &mut model.decisions[item.object];
+        let Some(voxels) = model::grid_of(object, decision) else { continue };
+        if !levels::is_plain(&model.scene, object) {
+            continue;
+        }
+        let key = (Arc::as_ptr(&object.shape).addr(), object.materials.clone());
+        let made = known
+            .entry(key)
+            .or_insert_with(|| levels::of(&model.scene, object, &item.grid, voxels, control.threads));
+        levels.push((index, made.clone()));
+        let blocks = "blocks of 4 and 16 cells as one where they are no larger than a pixel";
+        *decision = match std::mem::replace(decision, Decision::Exact) {
+            Decision::Converted { bound, why } => {
+                Decision::Converted { bound, why: format!("{why}; {blocks}") }
+            }
+            Decision::Approximated { why } => Decision::Approximated { why: format!("{why}; {blocks}") },
+            _ => Decision::Approximated { why: blocks.to_owned() },
+        };
+    }
+    Ok(levels)
+}
+
 fn info() -> BackendInfo {
     BackendInfo {
         id: "voxel".to_owned(),
@@ -158,6 +194,15 @@ fn info() -> BackendInfo {
                 default: Value::Text("natural".to_owned()),
                 unit: "",
                 help: "Cells that are filled: by nature, a surface that stops water over corners or just over faces, or what is inside",
+                tag: "",
+                quality_axis: false,
+            },
+            Parameter {
+                name: "detail.blocks",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(false),
+                unit: "",
+                help: "Draw blocks of 4 and of 16 cells that are no larger than a pixel as one, of their mean color",
                 tag: "",
                 quality_axis: false,
             },
@@ -227,7 +272,7 @@ impl Renderer for Voxel {
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
         (self.ready, self.last) = (None, None);
-        let model =
+        let mut model =
             model::build(scene, need, (self.resolution(need), self.filling(need)), converter, control)?;
         self.chunks.begin();
         let (items, grid_bytes) = self.items(&model, control)?;
@@ -242,7 +287,9 @@ impl Renderer for Voxel {
         for (lamp, shadow) in lamps.iter_mut().zip(&demand.shadows) {
             lamp.is_blocked = shadow.is_ok();
         }
-        let world = World::new(model.scene, items, lamps, self.walk(need));
+        let is_coarse = need.settings.bool(&self.info.parameters, "detail.blocks");
+        let levels = if is_coarse { levels_of(&mut model, &items, control)? } else { Vec::new() };
+        let world = World::new(model.scene, items, &levels, lamps, self.walk(need));
         let bytes = world.bytes() + grid_bytes + self.chunks.bytes();
         let decisions: Arc<[Decision]> = model.decisions.into();
         self.ready = Some(Ready {
@@ -257,6 +304,7 @@ impl Renderer for Voxel {
             checkerboard: need.settings.bool(&self.info.parameters, "checkerboard")
                 && self.samples(need) == 1,
             samples: self.samples(need),
+            is_coarse,
         });
         Ok(Prepared { objects: decisions, bytes })
     }
@@ -287,7 +335,9 @@ impl Renderer for Voxel {
             Some(last) => Pattern::Half { first: last.first ^ 1, fills: false },
             None => Pattern::Half { first: self.halves & 1, fills: true },
         };
-        let painter = Painter::new(&frame.camera, target, pattern, ready.samples);
+        let footprint =
+            if ready.is_coarse { Footprint::of(&frame.camera, target.height()) } else { Footprint::NONE };
+        let painter = Painter::new(&frame.camera, target, pattern, ready.samples, footprint);
         let [rays, shadow_rays, steps] = [const { AtomicU64::new(0) }; 3];
         let stopped = AtomicBool::new(false);
         target.for_each_band(control.threads, TILE, &|mut band| {

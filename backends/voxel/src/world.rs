@@ -3,6 +3,7 @@
 use crate::beam::{Beam, Bundle, Span};
 use crate::grid::{Grid, Layer};
 use crate::lamps::Lamp;
+use crate::levels::{BLOCK, Coarse, Footprint};
 use crate::tree::{Tree, WorldRay};
 use crate::walk::packet::Order;
 use crate::walk::{Found, GridRay, Moment, Walk, fixed};
@@ -59,6 +60,12 @@ pub(crate) struct Item {
     pub(crate) radius: f64,
     /// Whether each cell that may be seen is seen, so that no texture need be asked for holes.
     pub(crate) without_holes: bool,
+    /// Longest edge of a cell in the world.
+    pub(crate) edge: f64,
+    /// Which item holds the blocks that stand for cells of this one from afar.
+    pub(crate) coarser: Option<u32>,
+    /// Colors of cells that are blocks of others, x fastest.
+    pub(crate) colors: Option<Arc<[Vec3]>>,
 }
 
 /// How many rays were followed, and how many cells and empty blocks they left.
@@ -137,7 +144,7 @@ pub(crate) struct Reach {
 }
 
 /// A tile that sees more grids has its rays go through the tree.
-const MOST_GRIDS: usize = 6;
+const MOST_GRIDS: usize = 8;
 
 impl Reach {
     /// Tells whether there is nothing to be met.
@@ -178,7 +185,44 @@ impl Item {
         let world_from_normal: DMat3 = grid_from_world.matrix3.transpose();
         let normals =
             std::array::from_fn(|face| (world_from_normal * outward(face)).normalize_or(outward(face)));
-        Self { object, grid, grid_from_world, normals, radius: thing.bounds().radius(), without_holes }
+        let matrix = thing.world_from_object.matrix3;
+        let edge = matrix.x_axis.length().max(matrix.y_axis.length()).max(matrix.z_axis.length());
+        let radius = thing.bounds().radius();
+        let (coarser, colors) = (None, None);
+        Self { object, grid, grid_from_world, normals, radius, without_holes, edge, coarser, colors }
+    }
+
+    /// Returns the blocks of this grid as an item of their own.
+    fn coarse(&self, level: &Coarse) -> Self {
+        let scale = f64::from(BLOCK);
+        Self {
+            grid: level.grid.clone(),
+            grid_from_world: DAffine3::from_scale(DVec3::splat(1.0 / scale)) * self.grid_from_world,
+            edge: self.edge * scale,
+            colors: Some(level.colors.clone()),
+            coarser: None,
+            ..*self
+        }
+    }
+
+    /// Returns the color of a cell that stands for others.
+    pub(crate) fn color_of(&self, cell: [i32; 3]) -> Option<Vec3> {
+        let colors = self.colors.as_ref()?;
+        let [nx, ny, _] = self.grid.seen.size.map(|s| s as usize);
+        let [x, y, z] = cell.map(|c| c as usize);
+        colors.get((z * ny + y) * nx + x).copied()
+    }
+
+    /// Returns from where to where along a ray the cells of this grid are looked for: before, they are larger than a
+    /// pixel, and behind, blocks of them are not.
+    pub(crate) fn range(&self, items: &[Self], footprint: &Footprint) -> [f64; 2] {
+        let begins = if self.colors.is_some() {
+            (footprint.distance(self.edge) - self.edge * 3f64.sqrt()).max(0.0)
+        } else {
+            0.0
+        };
+        let coarser = self.coarser.and_then(|c| items.get(c as usize));
+        [begins, coarser.map_or(f64::INFINITY, |coarser| footprint.distance(coarser.edge))]
     }
 
     #[inline(always)]
@@ -211,7 +255,14 @@ impl Item {
 }
 
 impl World {
-    pub(crate) fn new(scene: Arc<Scene>, items: Vec<Item>, lamps: Vec<Lamp>, walk: Numbers) -> Self {
+    /// `levels` are the coarser grids of some items, finest first.
+    pub(crate) fn new(
+        scene: Arc<Scene>,
+        mut items: Vec<Item>,
+        levels: &[(usize, [Coarse; 2])],
+        lamps: Vec<Lamp>,
+        walk: Numbers,
+    ) -> Self {
         let boxes: Vec<Aabb> = items
             .iter()
             .map(|item| {
@@ -220,6 +271,16 @@ impl World {
                 bounds.grown(largest * 1e-12 + f64::MIN_POSITIVE)
             })
             .collect();
+        // The tree holds the grids as they are: what goes through glass or comes from mirrors, and what seeks light.
+        for (index, levels) in levels {
+            let mut finer = *index;
+            for level in levels {
+                let coarse = items[finer].coarse(level);
+                items[finer].coarser = Some(items.len() as u32);
+                finer = items.len();
+                items.push(coarse);
+            }
+        }
         Self { scene, tree: Tree::new(&boxes), items, lamps, walk }
     }
 
@@ -236,16 +297,26 @@ impl World {
 
     /// Finds which grids rays may meet, and where in them cells are marked in a layer. Nothing where the rays go
     /// apart too far, or see too many grids.
-    pub(crate) fn reach(&self, bundle: &Bundle<'_>, layer: fn(&Grid) -> &Layer) -> Option<Reach> {
+    pub(crate) fn reach(
+        &self,
+        bundle: &Bundle<'_>,
+        layer: fn(&Grid) -> &Layer,
+        footprint: &Footprint,
+    ) -> Option<Reach> {
         let mut reach = Reach { count: 0, grids: [None; MOST_GRIDS] };
         let beam = Beam::of(bundle, &DAffine3::IDENTITY)?;
         let is_whole = self.tree.visit_beam(&beam, &mut |index| {
-            let item = &self.items[index];
-            let Some(beam) = Beam::of(bundle, &item.grid_from_world) else { return false };
-            let Some(span) = beam.span(layer(&item.grid)) else { return true };
-            let Some(place) = reach.grids.get_mut(reach.count) else { return false };
-            *place = Some((index as u32, span));
-            reach.count += 1;
+            let mut level = Some(index as u32);
+            while let Some(index) = level {
+                let item = &self.items[index as usize];
+                let Some(beam) = Beam::of(bundle, &item.grid_from_world) else { return false };
+                if let Some(span) = beam.span(layer(&item.grid)) {
+                    let Some(place) = reach.grids.get_mut(reach.count) else { return false };
+                    *place = Some((index, span));
+                    reach.count += 1;
+                }
+                level = item.coarser.filter(|_| item.range(&self.items, footprint)[1] < f64::INFINITY);
+            }
             true
         });
         is_whole.then_some(reach)
@@ -266,6 +337,24 @@ impl World {
         let moment = if enter > 0.0 { Moment::before(enter) } else { Moment::START };
         let walk = Walk::begin(grid_ray, item.grid.seen.size, moment)?;
         self.first_surface(index, walk, None, Place::START, before.min(leave), counts)
+    }
+
+    /// Finds the first block that a ray enters in a coarser grid between two distances. The block that it is in at the
+    /// first was passed by the finer grid, where it is not the origin.
+    pub(crate) fn meet_coarse(
+        &self,
+        index: usize,
+        ray: &Ray,
+        [from, to]: [f64; 2],
+        counts: &Counts,
+    ) -> Option<Met> {
+        let item = &self.items[index];
+        let moment = if from > 0.0 { Moment::before(from) } else { Moment::START };
+        let mut walk = Walk::begin(item.grid_ray(ray)?, item.grid.seen.size, moment)?;
+        if from > 0.0 && walk.entered.is_none() && !walk.leave(0) {
+            return None;
+        }
+        self.first_surface(index, walk, None, Place::START, to, counts)
     }
 
     /// Goes on to the first marked cell in the numbers that were chosen.

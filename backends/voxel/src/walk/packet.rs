@@ -251,6 +251,11 @@ impl Packet {
         }
     }
 
+    /// Tells which walks are in the cell that they began in.
+    pub(crate) fn begun_in(&self) -> Mask8 {
+        I32x8(self.entered).equal(I32x8::splat(3))
+    }
+
     /// Returns how the cells at hand were entered, in double precision.
     #[inline(always)]
     pub(crate) fn faces(&self, rays: &GridRays) -> Faces {
