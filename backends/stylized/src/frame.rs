@@ -112,8 +112,9 @@ impl Buffers {
             }
         });
         control.check()?;
-        lines.strokes.extend(outline.strokes());
-        lines.strokes.extend(cracks.iter().flat_map(|c| &c.strokes));
+        for strokes in outline.strokes().chain(cracks.iter().map(|c| &c.strokes[..])) {
+            lines.strokes.extend_from_slice(strokes);
+        }
         Ok(())
     }
 

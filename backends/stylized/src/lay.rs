@@ -1,6 +1,6 @@
 //! How do highlights and strokes get onto eight pixels?
 
-use crate::eight::{Eight, numbers};
+use crate::eight::{Eight, difference, numbers};
 use crate::hatch::{EDGE, Hatching, Sticks};
 use crate::look::Look;
 use crate::paint::Painting;
@@ -21,20 +21,19 @@ impl Painting<'_> {
         cosine: F32x8,
         color: Vec3x8,
     ) -> Vec3x8 {
-        let Eight { x, y, count, first, direction } = *eight;
+        let Eight { x, y, count, first, ids, direction } = *eight;
         let zero = F32x8::ZERO;
         if !cosine.above(zero).any() {
             return color;
         }
-        let ids = &self.visible.id()[first..first + count];
         let look = |id: u32| &self.looks[(id.wrapping_sub(1) as usize).min(self.looks.len() - 1)];
         let first_look = look(ids[0].max(1));
         let mut strength = F32x8::splat(first_look.specular);
         let mut faint = F32x8::splat(first_look.faint);
         let mut shininess = [first_look.shininess; LANES];
-        if ids.iter().any(|&id| id != ids[0]) {
-            for (lane, &id) in ids.iter().enumerate() {
-                let look = look(id);
+        if difference::<LANES>(&ids, ids[0]) != 0 {
+            for (lane, id) in ids.into_iter().enumerate() {
+                let look = look(id.max(1));
                 (strength.0[lane], faint.0[lane], shininess[lane]) =
                     (look.specular, look.faint, look.shininess);
             }
@@ -86,7 +85,7 @@ impl Painting<'_> {
         (own, coded, normal, cosine): (Vec3x8, Vec3x8, Vec3x8, F32x8),
         color: Vec3x8,
     ) -> Vec3x8 {
-        let Eight { x, y, count, first, direction } = *eight;
+        let Eight { x, y, count, first, ids, direction } = *eight;
         let (one, half) = (F32x8::splat(1.0), F32x8::splat(0.5));
         let mut light = (one + cosine) * half;
         if hatching.texture > 0.0 {
@@ -95,7 +94,6 @@ impl Painting<'_> {
             light = light * (one - dark * F32x8::splat(hatching.texture));
         }
         let darkness = one - light;
-        let ids = &self.visible.id()[first..first + count];
         if !darkness.above(F32x8::splat(hatching.lightest)).any() {
             return color;
         }
@@ -112,12 +110,13 @@ impl Painting<'_> {
             let is_parallel = matches!(self.camera.projection, Projection::Orthographic { .. });
             let pixels = if is_parallel { F32x8::splat(pixel) } else { distance * F32x8::splat(pixel) };
             let mut lane = 0;
-            let is_one = ids.iter().fold(0, |differ, id| differ | (id ^ ids[0])) == 0;
             // Run by run of one object.
             while lane < count {
                 let id = ids[lane];
-                let other = (lane + 1..count).find(|&next| !is_one && ids[next] != id);
-                let end = other.unwrap_or(count);
+                let mut end = lane + 1;
+                while end < count && ids[end] == id {
+                    end += 1;
+                }
                 let index = (id.wrapping_sub(1) as usize).min(self.looks.len() - 1);
                 if id != 0 {
                     let look = &self.looks[index];

@@ -108,9 +108,9 @@ impl Scratch {
         });
     }
 
-    /// Lists the lines, in the order of bodies and edges.
-    pub(crate) fn strokes(&self) -> impl Iterator<Item = &Stroke> {
-        self.pieces.iter().flat_map(|piece| &piece.strokes)
+    /// Lists the lines piece by piece, in the order of bodies and edges.
+    pub(crate) fn strokes(&self) -> impl Iterator<Item = &[Stroke]> {
+        self.pieces.iter().map(|piece| &piece.strokes[..])
     }
 
     pub(crate) fn clear(&mut self) {
@@ -185,7 +185,9 @@ impl Piece {
                 continue;
             }
             let Some(kind) = kind_of(edge, turns, style) else { continue };
-            let [a, b] = edge.ends.map(|i| lens.ahead(body.edges.places[i as usize]));
+            let [a, b] = edge.ends;
+            let [a, b] = [&body.edges.places[a as usize], &body.edges.places[b as usize]];
+            let [a, b] = [lens.ahead(*a), lens.ahead(*b)];
             let line = Line { kind, style: style_index, object: body.object, dashes: style.dashes_hidden };
             trace(&lens, sight, veil, line, [a, b], &mut self.strokes);
         }
@@ -193,17 +195,21 @@ impl Piece {
 }
 
 /// Returns as what an edge is drawn, if it is.
+#[inline(always)]
 fn kind_of(edge: &crate::edges::Edge, turns: bool, style: &Style) -> Option<Kind> {
     let is_drawn = |kind: Kind| style.pen(kind).is_drawn;
     let is_fold = edge.is_crowded || edge.cosine < style.crease_cosine;
-    let kinds = [
-        (Kind::Silhouette, turns),
-        (Kind::Border, edge.faces[1] == NO_FACE),
-        (Kind::Crease, is_fold),
-        (Kind::Material, edge.parts_materials),
-        (Kind::Wire, true),
-    ];
-    kinds.into_iter().find(|&(kind, is)| is && is_drawn(kind)).map(|(kind, _)| kind)
+    if turns && is_drawn(Kind::Silhouette) {
+        Some(Kind::Silhouette)
+    } else if edge.faces[1] == NO_FACE && is_drawn(Kind::Border) {
+        Some(Kind::Border)
+    } else if is_fold && is_drawn(Kind::Crease) {
+        Some(Kind::Crease)
+    } else if edge.parts_materials && is_drawn(Kind::Material) {
+        Some(Kind::Material)
+    } else {
+        is_drawn(Kind::Wire).then_some(Kind::Wire)
+    }
 }
 
 /// What is the same along an edge.
@@ -294,7 +300,7 @@ fn trace(
     strokes: &mut Vec<Stroke>,
 ) {
     let Some([a, b]) = lens.clip(a, b) else { return };
-    let [from, to] = [a, b].map(|p| lens.pixel(p));
+    let [from, to] = [lens.pixel(a), lens.pixel(b)];
     let (across, down) = (to[0] - from[0], to[1] - from[1]);
     let length = (across * across + down * down).sqrt();
     if !length.is_finite() || length > 1e5 {
@@ -302,11 +308,14 @@ fn trace(
     }
     let count = length.ceil().max(1.0) as usize;
     let at = |part: f64| [from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part];
+    let end = |i: usize| {
+        let [x, y] = at(i as f64 / count as f64);
+        [x as f32, y as f32]
+    };
     let mut put = |first: usize, last: usize, is_seen: bool| {
         if is_seen || line.dashes {
-            let [from, to] = [first, last].map(|i| at(i as f64 / count as f64).map(|c| c as f32));
             let Line { kind, style, object, .. } = line;
-            strokes.push(Stroke { from, to, kind, style, is_hidden: !is_seen, object });
+            strokes.push(Stroke { from: end(first), to: end(last), kind, style, is_hidden: !is_seen, object });
         }
     };
     let nearest = (-a.z).min(-b.z);
@@ -369,30 +378,41 @@ impl Sight<'_> {
             || pixel[1] > f64::from(height) - 0.5;
         let allowed = if is_outside { 24.0 } else { 1.5 } * size + 1e-5 * distance;
         let (x, y) = ((pixel[0] - 0.5).floor() as i32, (pixel[1] - 0.5).floor() as i32);
-        let [left, right] = [x, x.saturating_add(1)].map(|x| x.clamp(0, width - 1));
-        let [top, bottom] = [y, y.saturating_add(1)].map(|y| y.clamp(0, height - 1));
-        let index = |x: i32, y: i32| y as usize * width as usize + x as usize;
+        let column = |x: i32| x.clamp(0, width - 1) as usize;
+        let row = |y: i32| y.clamp(0, height - 1) as usize * width as usize;
+        let (left, right, top, bottom) =
+            (column(x), column(x.saturating_add(1)), row(y), row(y.saturating_add(1)));
+        let around = [top + left, top + right, bottom + left, bottom + right];
         let seen = self.visible.distance();
-        let around = [index(left, top), index(right, top), index(left, bottom), index(right, bottom)];
+        let most = seen[around[0]].max(seen[around[1]]).max(seen[around[2]].max(seen[around[3]]));
         let nearest_allowed = (distance - allowed) as f32;
-        if around.iter().any(|&i| seen[i] >= nearest_allowed) {
+        if most >= nearest_allowed {
             return Seen::Yes;
         }
         // A line at which a body ends may lie a little within its outline on the picture, as faces are flat: it is seen
         // where a pixel next to those shows what is behind.
-        let (x, y) = (pixel[0].floor() as i32, pixel[1].floor() as i32);
-        let beyond =
-            |k: i32| index((x + k % 3 - 1).clamp(0, width - 1), (y + k / 3 - 1).clamp(0, height - 1));
-        if ends && (0..9).any(|k| seen[beyond(k)] >= nearest_allowed) {
-            return Seen::Yes;
+        if ends {
+            let (x, y) = (pixel[0].floor() as i32, pixel[1].floor() as i32);
+            let (left, middle, right) =
+                (column(x.saturating_sub(1)), column(x), column(x.saturating_add(1)));
+            let mut most = 0.0f32;
+            for y in y.saturating_sub(1)..=y.saturating_add(1) {
+                let row = row(y);
+                most = most.max(seen[row + left].max(seen[row + middle]).max(seen[row + right]));
+            }
+            if most >= nearest_allowed {
+                return Seen::Yes;
+            }
         }
         // The surface of a pixel may run away from the eye. A plane says little far from its pixel, though.
         let far = (distance - allowed - 24.0 * size) as f32;
-        if around.iter().all(|&i| seen[i] < far) {
+        if most < far {
             return Seen::FarBehind;
         }
-        let is_on_plane =
-            around.iter().any(|&i| self.predicts(i, place, (distance, size, allowed), is_parallel));
+        let mut is_on_plane = false;
+        for i in around {
+            is_on_plane = is_on_plane || self.predicts(i, place, (distance, size, allowed), is_parallel);
+        }
         if is_on_plane { Seen::Yes } else { Seen::No }
     }
 

@@ -1,7 +1,6 @@
 //! From visible surfaces to colors: tone, highlights, strokes, paper, and lines on top, row by row.
 
-use crate::cracks::shows_nothing;
-use crate::eight::{Eight, gather, numbers, steepness};
+use crate::eight::{Eight, gather, ids, numbers, steepness, union};
 use crate::ink::{Ink, Sheaf};
 use crate::light::Lighting;
 use crate::look::Look;
@@ -16,8 +15,8 @@ use polyptych_core::shade::fogged;
 
 /// Rows drawn by one worker at a time.
 pub(crate) const ROWS: u32 = 32;
-/// Columns whose background is filled at once.
-const GROUND: usize = 64;
+/// Columns that are looked at, and whose background is filled, at once.
+const SPAN: usize = 64;
 /// Columns over which its color changes evenly.
 const EVEN: usize = 16;
 
@@ -119,10 +118,14 @@ impl Painting<'_> {
         let row = y as usize * width;
         let ids = &self.visible.id()[row..row + width];
         let directions = self.view.row(y);
+        let mut is_empty = false;
         for x in (0..width).step_by(LANES) {
             let count = (width - x).min(LANES);
+            if x % SPAN == 0 {
+                is_empty = union::<SPAN>(&ids[x..width.min(x + SPAN)]) == 0;
+            }
             let out = &mut facing[LANES + x..LANES + x + LANES];
-            if shows_nothing(&ids[x..x + count]) {
+            if is_empty || union::<LANES>(&ids[x..x + count]) == 0 {
                 out.fill(0.0);
                 continue;
             }
@@ -188,31 +191,42 @@ impl Painting<'_> {
         let directions = self.view.row(y);
         let paper = &self.styles.all[0].paper;
         let row = y as usize * width;
-        let ids = &self.visible.id()[row..row + width];
-        for (piece, (ids, colors)) in ids.chunks(GROUND).zip(colors.chunks_mut(GROUND)).enumerate() {
-            if ids.contains(&0) {
-                self.ground(paper, (piece * GROUND) as u32, y, directions.as_ref(), colors);
-            }
-        }
+        let seen = &self.visible.id()[row..row + width];
+        let mut is_empty = false;
         for x in (0..width).step_by(LANES) {
+            if x % SPAN == 0 {
+                let span = x..width.min(x + SPAN);
+                is_empty = union::<SPAN>(&seen[span.clone()]) == 0;
+                if is_empty || seen[span.clone()].contains(&0) {
+                    self.ground(paper, x as u32, y, directions.as_ref(), &mut colors[span]);
+                }
+            }
+            if is_empty {
+                continue;
+            }
             let count = (width - x).min(LANES);
-            let own_ids = &ids[x..x + count];
-            if shows_nothing(own_ids) {
+            let own_ids = ids(seen, x, count);
+            if union::<LANES>(&own_ids) == 0 {
                 continue;
             }
             let (direction, origin) = self.rays(x, y, directions.as_ref());
-            let eight = Eight { x: x as u32, y, count, first: row + x, direction };
+            let eight = Eight { x: x as u32, y, count, first: row + x, ids: own_ids, direction };
             let around = [own + LANES + x, stride];
             let out = &mut colors[x..x + count];
             // Mostly one style; each that is there paints its own pixels.
+            let is_one = self.styles.all.len() == 1;
             for (index, style) in (0u8..).zip(&self.styles.all) {
-                let is_own = |id: &u32| *id != 0 && self.styles.index(*id) == index;
-                if !own_ids.iter().any(is_own) {
+                let (mut own, mut any) = ([false; LANES], false);
+                for (own, id) in own.iter_mut().zip(own_ids) {
+                    *own = id != 0 && (is_one || self.styles.index(id) == index);
+                    any |= *own;
+                }
+                if !any {
                     continue;
                 }
                 let result = self.eight(style, &eight, origin, around, facing);
-                for (lane, (color, id)) in out.iter_mut().zip(own_ids).enumerate() {
-                    if is_own(id) {
+                for (lane, (color, own)) in out.iter_mut().zip(own).enumerate() {
+                    if own {
                         *color = result.get(lane);
                     }
                 }
@@ -276,8 +290,7 @@ impl Painting<'_> {
         if style.show != Show::Style {
             return self.study(style.show, eight);
         }
-        let Eight { count, first, .. } = *eight;
-        let ids = &self.visible.id()[first..first + count];
+        let Eight { count, first, ids, .. } = *eight;
         let mut own = gather(self.visible.albedo(), first, count);
         let coded = own;
         if self.any_coded && ids.iter().any(|&id| self.look(id).is_coded) {
@@ -344,7 +357,7 @@ impl Painting<'_> {
     fn decode(&self, eight: &Eight, own: &mut Vec3x8) {
         let coordinates = *own;
         for lane in 0..eight.count {
-            let id = self.visible.id()[eight.first + lane];
+            let id = eight.ids[lane];
             if !self.look(id).is_coded {
                 continue;
             }
