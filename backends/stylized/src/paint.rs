@@ -77,23 +77,6 @@ impl Painting<'_> {
         let Scratch { facing, ink } = scratch;
         let stride = width as usize + 2 * LANES;
         facing.resize(stride * (ROWS as usize + 2), 0.0);
-        if self.styles.all[0].show == Show::Style {
-            let steps = self.styles.all.iter().any(|s| s.tone.steps > 1);
-            let around = u32::from(steps);
-            let rows = first.saturating_sub(around)..(first + band.rows + around).min(self.visible.height());
-            for y in rows {
-                let row = (y + 1 - first) as usize * stride;
-                self.face(y, &mut facing[row..row + stride]);
-            }
-            // Beyond the picture it goes on as it is.
-            if first == 0 {
-                facing.copy_within(stride..2 * stride, 0);
-            }
-            if first + band.rows == self.visible.height() {
-                let last = band.rows as usize * stride;
-                facing.copy_within(last..last + stride, last + stride);
-            }
-        }
         let lines = self.styles.draw_lines();
         if lines {
             ink.clear(width, band.rows);
@@ -101,8 +84,26 @@ impl Painting<'_> {
                 ink.draw(stroke, self.styles, first, band.rows);
             }
         }
+        let (shades, height) = (self.styles.all[0].show == Show::Style, self.visible.height());
+        // Edges of steps are as wide as the rows around say.
+        let around = u32::from(self.styles.all.iter().any(|s| s.tone.steps > 1));
+        let mut next = first.saturating_sub(around);
         for row in 0..band.rows {
             let y = first + row;
+            // No sooner than they are asked for: what they are reckoned from is read again when the row is painted, and
+            // should still be near.
+            while shades && next <= (y + around).min(height - 1) {
+                let begin = (next + 1 - first) as usize * stride;
+                self.face(next, &mut facing[begin..begin + stride]);
+                // Beyond the picture it goes on as it is.
+                if next == 0 {
+                    facing.copy_within(stride..2 * stride, 0);
+                }
+                if next + 1 == height {
+                    facing.copy_within(begin..begin + stride, begin + stride);
+                }
+                next += 1;
+            }
             let colors = &mut band.color[(row * width) as usize..((row + 1) * width) as usize];
             self.row(y, (row as usize + 1) * stride, stride, facing, colors);
             if lines {
