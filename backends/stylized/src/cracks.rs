@@ -175,7 +175,8 @@ impl Surfaces<'_> {
             let id = ids[begin];
             if begin % SPAN == 0 {
                 let span = begin..(begin + SPAN).min(count);
-                let differ = difference::<SPAN>(&ids[span.clone()], id) | difference::<SPAN>(&next_ids[span], id);
+                let differ =
+                    difference::<SPAN>(&ids[span.clone()], id) | difference::<SPAN>(&next_ids[span], id);
                 passes = differ == 0 && is_plain(id);
             }
             if passes {

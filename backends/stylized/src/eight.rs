@@ -61,6 +61,22 @@ pub(crate) fn difference<const N: usize>(ids: &[u32], one: u32) -> u32 {
     any
 }
 
+/// Tells whether any of some pixels shows nothing.
+#[inline(always)]
+pub(crate) fn lacks<const N: usize>(ids: &[u32]) -> bool {
+    let mut any = 0;
+    if let Ok(all) = <&[u32; N]>::try_from(ids) {
+        for id in all {
+            any |= u32::from(*id == 0);
+        }
+    } else {
+        for id in ids {
+            any |= u32::from(*id == 0);
+        }
+    }
+    any != 0
+}
+
 /// Reads up to eight vectors; the rest are zero.
 #[inline(always)]
 pub(crate) fn gather(from: &[Vec3], first: usize, count: usize) -> Vec3x8 {

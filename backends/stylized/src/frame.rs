@@ -88,7 +88,7 @@ impl Buffers {
         let view = camera.view(visible.width(), visible.height());
         let straight = keeps_lines(&camera.projection);
         if straight {
-            let sight = Sight { camera, view, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
+            let sight = Sight { camera, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
             outline.fill(&outlines.bodies, &sight, control.threads);
         } else {
             outline.clear();

@@ -157,7 +157,7 @@ impl Run<'_> {
     fn ink(self, hatching: &Hatching, darkness: F32x8, ink: &mut F32x8) {
         let Self { look, lanes, place, normal, pixels, coordinates } = self;
         let texels = pixels * F32x8::splat(look.repeats * EDGE as f32);
-        let mut covered = F32x8::ZERO;
+        let mut covered;
         if let Some(coordinates) = coordinates {
             // A texture is taken to be laid once around the body: six periods.
             let scale = F32x8::splat(6.0 / hatching.scale);
@@ -184,27 +184,17 @@ impl Run<'_> {
                 / (most * F32x8::splat(0.3)).max(F32x8::splat(1e-20)))
             .max(zero)
             .min(F32x8::splat(0.5));
-            let is_first = [weights[0].at_least(most), weights[1].at_least(most), weights[2].at_least(most)];
-            let is_last =
-                [least.at_least(weights[0]), least.at_least(weights[1]), least.at_least(weights[2])];
-            let mut first = [Mask8::NONE; 3];
-            let mut second = [Mask8::NONE; 3];
-            first[0] = is_first[0];
-            first[1] = is_first[1] & !first[0];
-            first[2] = !(first[0] | first[1]);
-            for axis in 0..3 {
-                second[axis] = !first[axis] & !is_last[axis];
-            }
-            let planes = [(p.z, -p.y), (p.x, p.z), (p.x, -p.y)];
-            let mixes = mix.above(zero).any();
-            for (chosen, share, needed) in [(first, F32x8::splat(1.0) - mix, true), (second, mix, mixes)] {
-                if !needed {
-                    continue;
-                }
-                let pick = |a: F32x8, b: F32x8, c: F32x8| chosen[0].pick(a, chosen[1].pick(b, c));
-                let u = pick(planes[0].0, planes[1].0, planes[2].0);
-                let v = pick(planes[0].1, planes[1].1, planes[2].1);
-                covered = covered + hatching.ink(&u, &v, &texels, &darkness) * share;
+            let planes = Planes { u: [p.z, p.x, p.x], v: [-p.y, p.z, -p.y] };
+            let is_x = weights[0].at_least(most);
+            let is_y = weights[1].at_least(most) & !is_x;
+            let [u, v] = planes.across(is_x, is_y);
+            covered = hatching.ink(&u, &v, &texels, &darkness) * (F32x8::splat(1.0) - mix);
+            if mix.above(zero).any() {
+                // Neither that axis nor the one that it faces least.
+                let is_x = !is_x & !least.at_least(weights[0]);
+                let is_y = !is_y & !least.at_least(weights[1]);
+                let [u, v] = planes.across(is_x, is_y);
+                covered = covered + hatching.ink(&u, &v, &texels, &darkness) * mix;
             }
         }
         if lanes.len() == LANES {
@@ -214,6 +204,23 @@ impl Run<'_> {
         for lane in lanes {
             ink.0[lane] = covered.0[lane];
         }
+    }
+}
+
+/// Places on the planes across the three axes.
+struct Planes {
+    u: [F32x8; 3],
+    v: [F32x8; 3],
+}
+
+impl Planes {
+    /// Returns places on the plane across x, across y, or across z, lane by lane.
+    #[inline(always)]
+    fn across(&self, is_x: Mask8, is_y: Mask8) -> [F32x8; 2] {
+        [
+            is_x.pick(self.u[0], is_y.pick(self.u[1], self.u[2])),
+            is_x.pick(self.v[0], is_y.pick(self.v[1], self.v[2])),
+        ]
     }
 }
 

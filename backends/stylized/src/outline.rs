@@ -13,7 +13,7 @@ use crate::stroke::{Kind, Stroke};
 use crate::style::{Style, Styles};
 use crate::veil::Veil;
 use glam::{DAffine3, DVec3, Vec3};
-use polyptych_core::camera::{Camera, Projection, View};
+use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::framebuffer::Framebuffer;
 use polyptych_core::parallel::{Threads, for_each_mut};
 use std::sync::Arc;
@@ -63,7 +63,6 @@ struct Lens {
 /// What lines are looked for in.
 pub(crate) struct Sight<'a> {
     pub(crate) camera: &'a Camera,
-    pub(crate) view: View<'a>,
     pub(crate) visible: &'a Framebuffer,
     pub(crate) styles: &'a Styles,
     /// How large a pixel is at distance 1, or for parallel rays at any.
@@ -315,7 +314,14 @@ fn trace(
     let mut put = |first: usize, last: usize, is_seen: bool| {
         if is_seen || line.dashes {
             let Line { kind, style, object, .. } = line;
-            strokes.push(Stroke { from: end(first), to: end(last), kind, style, is_hidden: !is_seen, object });
+            strokes.push(Stroke {
+                from: end(first),
+                to: end(last),
+                kind,
+                style,
+                is_hidden: !is_seen,
+                object,
+            });
         }
     };
     let nearest = (-a.z).min(-b.z);
@@ -323,15 +329,15 @@ fn trace(
         return put(0, count, false);
     }
     // Equal steps on the picture are equal steps on a plane before the eye, and of one over the depth.
-    let flat = |p: DVec3| if lens.is_parallel { p } else { DVec3::new(p.x / -p.z, p.y / -p.z, 1.0 / -p.z) };
+    let flat = |p: DVec3| if lens.is_parallel { p } else { DVec3::new(p.x, p.y, 1.0) / -p.z };
     let (flat_a, flat_b) = (flat(a), flat(b));
     let ends = line.kind == Kind::Silhouette;
     let (mut begin, mut state, mut i) = (0, None, 0);
     while i < count {
         let part = (i as f64 + 0.5) / count as f64;
         let p = flat_a + (flat_b - flat_a) * part;
-        let place = if lens.is_parallel { p } else { DVec3::new(p.x, p.y, -1.0) / p.z };
-        let seen = sight.sees(at(part), place, lens.is_parallel, ends);
+        let place = if lens.is_parallel { p } else { DVec3::new(p.x, p.y, -1.0) * (1.0 / p.z) };
+        let seen = sight.sees(at(part), place, lens, ends);
         let is_seen = seen == Seen::Yes;
         if state != Some(is_seen) {
             if let Some(was) = state {
@@ -367,10 +373,10 @@ impl Sight<'_> {
     /// Tells whether nothing hides a place of an edge: `pixel` is where it is on the picture, `place` where in camera
     /// space; `ends` for one at which the body ends.
     #[inline(always)]
-    fn sees(&self, pixel: [f64; 2], place: DVec3, is_parallel: bool, ends: bool) -> Seen {
+    fn sees(&self, pixel: [f64; 2], place: DVec3, lens: &Lens, ends: bool) -> Seen {
         let (width, height) = (self.visible.width() as i32, self.visible.height() as i32);
-        let distance = if is_parallel { -place.z } else { place.length() };
-        let size = if is_parallel { self.pixel } else { self.pixel * distance };
+        let distance = if lens.is_parallel { -place.z } else { place.length() };
+        let size = if lens.is_parallel { self.pixel } else { self.pixel * distance };
         // Beyond the picture's edge nothing is known: what is there is judged by the nearest pixels, and generously.
         let is_outside = pixel[0] < 0.5
             || pixel[1] < 0.5
@@ -393,8 +399,7 @@ impl Sight<'_> {
         // where a pixel next to those shows what is behind.
         if ends {
             let (x, y) = (pixel[0].floor() as i32, pixel[1].floor() as i32);
-            let (left, middle, right) =
-                (column(x.saturating_sub(1)), column(x), column(x.saturating_add(1)));
+            let (left, middle, right) = (column(x.saturating_sub(1)), column(x), column(x.saturating_add(1)));
             let mut most = 0.0f32;
             for y in y.saturating_sub(1)..=y.saturating_add(1) {
                 let row = row(y);
@@ -409,42 +414,48 @@ impl Sight<'_> {
         if most < far {
             return Seen::FarBehind;
         }
-        let mut is_on_plane = false;
-        for i in around {
-            is_on_plane = is_on_plane || self.predicts(i, place, (distance, size, allowed), is_parallel);
-        }
+        let limits = (distance, size, distance - allowed);
+        let (x, y) = (x.clamp(-1, width), y.clamp(-1, height));
+        let is_on_plane = self.predicts((x, y), place, limits, lens)
+            || self.predicts((x + 1, y), place, limits, lens)
+            || self.predicts((x, y + 1), place, limits, lens)
+            || self.predicts((x + 1, y + 1), place, limits, lens);
         if is_on_plane { Seen::Yes } else { Seen::No }
     }
 
-    /// Tells whether the plane of a pixel does not hide a place.
+    /// Tells whether the plane of what a pixel shows does not hide a place.
+    #[inline(always)]
     fn predicts(
         &self,
-        i: usize,
+        (x, y): (i32, i32),
         place: DVec3,
-        (distance, size, allowed): (f64, f64, f64),
-        is_parallel: bool,
+        (distance, size, limit): (f64, f64, f64),
+        lens: &Lens,
     ) -> bool {
-        let width = self.visible.width() as usize;
+        let [x, y] =
+            [x.clamp(0, self.visible.width() as i32 - 1), y.clamp(0, self.visible.height() as i32 - 1)];
+        let i = y as usize * self.visible.width() as usize + x as usize;
         let found = f64::from(self.visible.distance()[i]);
-        let direction = if is_parallel {
-            self.camera.forward()
-        } else {
-            self.camera.world_from_camera * place / distance
-        };
-        let normal = self.visible.normal()[i].as_dvec3();
-        let slope = normal.dot(direction);
-        if slope > -1e-3 || found + 24.0 * size < distance - allowed {
+        if found + 24.0 * size < limit {
             return false;
         }
-        let Some(ray) = self.view.ray((i % width) as f64 + 0.5, (i / width) as f64 + 0.5) else {
+        // All in camera space.
+        let (normal, axes) = (self.visible.normal()[i].as_dvec3(), &self.camera.world_from_camera);
+        let normal = DVec3::new(axes.x_axis.dot(normal), axes.y_axis.dot(normal), axes.z_axis.dot(normal));
+        let slope = if lens.is_parallel { -normal.z } else { normal.dot(place) / distance };
+        if slope > -1e-3 {
             return false;
-        };
-        let origin = if is_parallel {
-            self.camera.eye + self.camera.world_from_camera * DVec3::new(place.x, place.y, 0.0)
+        }
+        let middle = DVec3::new(
+            ((f64::from(x) + 0.5) * 2.0 / lens.size[0] - 1.0) * lens.half[0],
+            (1.0 - (f64::from(y) + 0.5) * 2.0 / lens.size[1]) * lens.half[1],
+            -1.0,
+        );
+        let predicted = if lens.is_parallel {
+            normal.dot(DVec3::new(middle.x - place.x, middle.y - place.y, -found)) / slope
         } else {
-            ray.origin
+            normal.dot(middle) * found / (middle.length() * slope)
         };
-        let predicted = normal.dot(ray.at(found) - origin) / slope;
-        predicted.min(found + 24.0 * size) >= distance - allowed
+        predicted.min(found + 24.0 * size) >= limit
     }
 }

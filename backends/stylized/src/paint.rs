@@ -1,6 +1,6 @@
 //! From visible surfaces to colors: tone, highlights, strokes, paper, and lines on top, row by row.
 
-use crate::eight::{Eight, gather, ids, numbers, steepness, union};
+use crate::eight::{Eight, gather, ids, lacks, numbers, steepness, union};
 use crate::ink::{Ink, Sheaf};
 use crate::light::Lighting;
 use crate::look::Look;
@@ -198,7 +198,7 @@ impl Painting<'_> {
             if x % SPAN == 0 {
                 let span = x..width.min(x + SPAN);
                 is_empty = union::<SPAN>(&seen[span.clone()]) == 0;
-                if is_empty || seen[span.clone()].contains(&0) {
+                if is_empty || lacks::<SPAN>(&seen[span.clone()]) {
                     self.ground(paper, x as u32, y, directions.as_ref(), &mut colors[span]);
                 }
             }
@@ -214,21 +214,23 @@ impl Painting<'_> {
             let eight = Eight { x: x as u32, y, count, first: row + x, ids: own_ids, direction };
             let around = [own + LANES + x, stride];
             let out = &mut colors[x..x + count];
-            // Mostly one style; each that is there paints its own pixels.
-            let is_one = self.styles.all.len() == 1;
+            // Mostly one style paints all; where there are several, each paints its own pixels.
+            let is_whole = self.styles.all.len() == 1 && !lacks::<LANES>(&own_ids);
             for (index, style) in (0u8..).zip(&self.styles.all) {
-                let (mut own, mut any) = ([false; LANES], false);
-                for (own, id) in own.iter_mut().zip(own_ids) {
-                    *own = id != 0 && (is_one || self.styles.index(id) == index);
-                    any |= *own;
-                }
-                if !any {
+                let is_own = |id: u32| id != 0 && self.styles.index(id) == index;
+                if !is_whole && !own_ids.into_iter().any(is_own) {
                     continue;
                 }
                 let result = self.eight(style, &eight, origin, around, facing);
-                for (lane, (color, own)) in out.iter_mut().zip(own).enumerate() {
-                    if own {
+                if let (true, Ok(out)) = (is_whole, <&mut [Vec3; LANES]>::try_from(&mut *out)) {
+                    for (lane, color) in out.iter_mut().enumerate() {
                         *color = result.get(lane);
+                    }
+                } else {
+                    for (lane, (color, id)) in out.iter_mut().zip(own_ids).enumerate() {
+                        if is_own(id) {
+                            *color = result.get(lane);
+                        }
                     }
                 }
             }
