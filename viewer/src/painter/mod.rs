@@ -225,10 +225,7 @@ fn yield_to_the_window() {
     // With 5 a frame of the window in 20 was late where OpenGL is drawn in software, with 10 one in 1800.
     let own = rustix::thread::gettid();
     // A system that refuses leaves the thread as it is.
-    let _ = rustix::process::setpriority_process(
-        Some(own),
-        std::env::var("NICE").map_or(10, |n| n.parse().unwrap_or(10)),
-    );
+    let _ = rustix::process::setpriority_process(Some(own), 10);
 }
 
 #[cfg(not(target_os = "linux"))]
