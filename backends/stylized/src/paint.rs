@@ -119,14 +119,15 @@ impl Painting<'_> {
         let row = y as usize * width;
         let ids = &self.visible.id()[row..row + width];
         let directions = self.view.row(y);
-        let mut is_empty = false;
+        let (mut is_empty, mut is_full) = (false, false);
         for x in (0..width).step_by(LANES) {
             let count = (width - x).min(LANES);
             if x % SPAN == 0 {
-                is_empty = union::<SPAN>(&ids[x..width.min(x + SPAN)]) == 0;
+                let span = &ids[x..width.min(x + SPAN)];
+                (is_empty, is_full) = (union::<SPAN>(span) == 0, !lacks::<SPAN>(span));
             }
             let out = &mut facing[LANES + x..LANES + x + LANES];
-            if is_empty || union::<LANES>(&ids[x..x + count]) == 0 {
+            if is_empty || !is_full && union::<LANES>(&ids[x..x + count]) == 0 {
                 out.fill(0.0);
                 continue;
             }
@@ -193,12 +194,13 @@ impl Painting<'_> {
         let paper = &self.styles.all[0].paper;
         let row = y as usize * width;
         let seen = &self.visible.id()[row..row + width];
-        let mut is_empty = false;
+        let (mut is_empty, mut is_full) = (false, false);
         for x in (0..width).step_by(LANES) {
             if x % SPAN == 0 {
                 let span = x..width.min(x + SPAN);
-                is_empty = union::<SPAN>(&seen[span.clone()]) == 0;
-                if is_empty || lacks::<SPAN>(&seen[span.clone()]) {
+                let ids = &seen[span.clone()];
+                (is_empty, is_full) = (union::<SPAN>(ids) == 0, !lacks::<SPAN>(ids));
+                if !is_full {
                     self.ground(paper, x as u32, y, directions.as_ref(), &mut colors[span]);
                 }
             }
@@ -207,7 +209,7 @@ impl Painting<'_> {
             }
             let count = (width - x).min(LANES);
             let own_ids = ids(seen, x, count);
-            if union::<LANES>(&own_ids) == 0 {
+            if !is_full && union::<LANES>(&own_ids) == 0 {
                 continue;
             }
             let (direction, origin) = self.rays(x, y, directions.as_ref());
@@ -215,7 +217,7 @@ impl Painting<'_> {
             let around = [own + LANES + x, stride];
             let out = &mut colors[x..x + count];
             // Mostly one style paints all; where there are several, each paints its own pixels.
-            let is_whole = self.styles.all.len() == 1 && !lacks::<LANES>(&own_ids);
+            let is_whole = self.styles.all.len() == 1 && (is_full || !lacks::<LANES>(&own_ids));
             for (index, style) in (0u8..).zip(&self.styles.all) {
                 let is_own = |id: u32| id != 0 && self.styles.index(id) == index;
                 if !is_whole && !own_ids.into_iter().any(is_own) {
