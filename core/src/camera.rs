@@ -332,7 +332,7 @@ impl View<'_> {
     #[must_use]
     pub fn pixel_size(&self, distance: f64) -> f64 {
         match &self.camera.projection {
-            Projection::Perspective { fov_y } => distance * 2.0 * (fov_y * 0.5).tan() / self.height,
+            Projection::Perspective { .. } => distance * 2.0 * self.half / self.height,
             Projection::Orthographic { height } => height / self.height,
             Projection::Fisheye { fov } => distance * fov / self.width.min(self.height),
             Projection::Cylindrical { fov_x, .. } => distance * fov_x / self.width,

@@ -153,6 +153,8 @@ pub struct Framebuffer {
     coverage: Plane<f32>,
     /// Changes whenever something may be written.
     stamp: u64,
+    /// The stamp with which each plane may last have been written to, in the order of [`Channel::ALL`].
+    written: [u64; 7],
     _owner: Option<Owner>,
 }
 
@@ -216,6 +218,7 @@ impl Framebuffer {
     pub fn new(width: u32, height: u32, channels: Channels) -> Self {
         let n = width as usize * height as usize;
         let len = |c: Channel| if channels.has(c) { n } else { 0 };
+        let stamp = next_stamp();
         Self {
             width,
             height,
@@ -227,7 +230,8 @@ impl Framebuffer {
             albedo: Plane::Own(vec![Vec3::ZERO; len(Channel::Albedo)]),
             shadow: Plane::Own(vec![1.0; len(Channel::Shadow)]),
             coverage: Plane::Own(vec![0.0; len(Channel::Coverage)]),
-            stamp: next_stamp(),
+            stamp,
+            written: [stamp; 7],
             _owner: None,
         }
     }
@@ -252,6 +256,7 @@ impl Framebuffer {
                 return Err(format!("{length} pixels of {} where {wanted} are needed", channel.name()));
             }
         }
+        let stamp = next_stamp();
         Ok(Self {
             width,
             height,
@@ -263,7 +268,8 @@ impl Framebuffer {
             albedo: Plane::Lent(albedo),
             shadow: Plane::Lent(shadow),
             coverage: Plane::Lent(coverage),
-            stamp: next_stamp(),
+            stamp,
+            written: [stamp; 7],
             _owner: Some(Owner(owner)),
         })
     }
@@ -339,6 +345,7 @@ impl Framebuffer {
                 Channel::Shadow => swap(&mut self.shadow, &mut other.shadow),
                 Channel::Coverage => swap(&mut self.coverage, &mut other.coverage),
             }
+            swap(&mut self.written[channel as usize], &mut other.written[channel as usize]);
         }
     }
 
@@ -346,17 +353,27 @@ impl Framebuffer {
     /// written. Clones share it until they are written to. Nothing for lent memory, to which others may write.
     #[must_use]
     pub fn stamp(&self) -> Option<u64> {
-        let is_lent = self.color.is_lent()
+        (!self.is_lent()).then_some(self.stamp)
+    }
+
+    /// Returns the same plane by plane, in the order of [`Channel::ALL`]: a plane that is exchanged takes its number
+    /// along, and [`Framebuffer::touch`] leaves all as they are.
+    #[must_use]
+    pub fn written(&self) -> Option<[u64; 7]> {
+        (!self.is_lent()).then_some(self.written)
+    }
+
+    fn is_lent(&self) -> bool {
+        self.color.is_lent()
             || self.distance.is_lent()
             || self.normal.is_lent()
             || self.id.is_lent()
             || self.albedo.is_lent()
             || self.shadow.is_lent()
-            || self.coverage.is_lent();
-        (!is_lent).then_some(self.stamp)
+            || self.coverage.is_lent()
     }
 
-    /// Makes the content count as changed, so that a back end draws it again: what measures drawing asks for that.
+    /// Makes the picture count as another one, so that a back end draws it again: what measures drawing asks for that.
     pub fn touch(&mut self) {
         self.stamp = next_stamp();
     }
@@ -374,6 +391,7 @@ impl Framebuffer {
     /// Returns the whole picture as one band.
     pub fn band(&mut self) -> Band<'_> {
         self.touch();
+        self.written = [self.stamp; 7];
         Band {
             width: self.width,
             first_row: 0,

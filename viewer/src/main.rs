@@ -47,6 +47,7 @@ impl Arguments {
 fn main() -> ExitCode {
     // A plugin's own process is this program, called anew.
     plugins::serve();
+    leave_cores_to_painters();
     let Some(arguments) = Arguments::read(std::env::args().skip(1)) else {
         eprintln!("usage: {USAGE}");
         return ExitCode::from(WRONG_USE);
@@ -59,6 +60,25 @@ fn main() -> ExitCode {
         }
     }
 }
+
+/// Starts anew with few threads for an OpenGL that is drawn in software (Mesa's llvmpipe), unless somebody chose a
+/// number: it takes all cores that it finds from those who draw the pictures, to show them hardly sooner.
+#[cfg(target_os = "linux")]
+fn leave_cores_to_painters() {
+    use std::os::unix::process::CommandExt;
+    const THREADS: &str = "LP_NUM_THREADS";
+    if let (None, Ok(own)) = (std::env::var_os(THREADS), std::env::current_exe()) {
+        let count = std::thread::available_parallelism().map_or(1, usize::from) / 4;
+        // Whatever keeps it from starting anew, it goes on as it is.
+        let _ = std::process::Command::new(own)
+            .args(std::env::args_os().skip(1))
+            .env(THREADS, count.to_string())
+            .exec();
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn leave_cores_to_painters() {}
 
 fn run(arguments: &Arguments) -> Result<(), (u8, String)> {
     if let Some(folder) = arguments.plugin_folders.iter().find(|folder| !folder.is_dir()) {

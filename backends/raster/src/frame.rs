@@ -1,6 +1,7 @@
 //! How is a frame drawn? The steps of the pipeline, in order.
 
 use crate::bin::{Bins, Pass};
+use crate::blank::Blank;
 use crate::drawing::Drawing;
 use crate::faces::{Faces, face_lens, needed};
 use crate::grid::TileGrid;
@@ -32,6 +33,7 @@ pub(crate) struct Pipeline {
     bins: Bins,
     strokes: Strokes,
     bands: Vec<Mutex<paint::Scratch>>,
+    blank: Blank,
 }
 
 /// What a frame took.
@@ -77,11 +79,12 @@ impl Scratch {
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        let Pipeline { vertices, bins, strokes, bands } = &self.pipeline;
+        let Pipeline { vertices, bins, strokes, bands, blank } = &self.pipeline;
         let bands: usize = bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
         (vertices.capacity() * size_of::<ScreenVertices>() + bands) as u64
             + bins.bytes()
             + strokes.bytes()
+            + blank.bytes()
             + self.faces.bytes()
     }
 }
@@ -97,7 +100,7 @@ impl Pipeline {
         work: &mut Work,
         control: &Control<'_>,
     ) -> Result<(), Cancelled> {
-        let Self { vertices, bins, strokes, bands } = self;
+        let Self { vertices, bins, strokes, bands, blank } = self;
         control.check()?;
         let culls_back = ready.options.culls_back;
         let smooth = ready.places.len() > 1;
@@ -106,7 +109,8 @@ impl Pipeline {
         transform(&ready.model, lens, vertices, control.threads);
         work.phases.end("transform");
         // 2. Clip, set up, and sort the triangles into tiles.
-        bins.fill(&pass, vertices, &TileGrid::new(lens.width, lens.height).smooth(smooth), control.threads);
+        let grid = TileGrid::new(lens.width, lens.height).smooth(smooth);
+        bins.fill(&pass, vertices, &grid, control.threads);
         work.triangles += bins.triangles();
         let drawing = ready.lines.as_deref().map(|lines| {
             let hides = ready.options.mode == Mode::HiddenLine;
@@ -123,11 +127,14 @@ impl Pipeline {
             lighting: ready.options.lighting.unwrap_or(ready.scene.environment.lighting),
         };
         let look = Look { shading: ready.options.shading, places: &ready.places, drawing };
-        let painter = Painter::new(light, look, lens, bins, target.channels());
+        let background = &ready.scene.environment.background;
+        blank.begin(target, grid.count(), lens, background);
+        let painter = Painter::new(light, look, lens, bins, blank, target.channels());
         work.shaded += painter.paint(target, bands, announce, control)?;
         if painter.paint_crossings(target, control) && announce == Announce::Yes {
             control.finished(&target.band());
         }
+        blank.end(target, lens, background);
         work.phases.end("draw");
         Ok(())
     }

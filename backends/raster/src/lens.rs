@@ -27,7 +27,7 @@ pub(crate) struct Lens {
     row: Row,
     ahead: Row,
     start: Linear,
-    direction: Linear,
+    pub(crate) direction: Linear,
 }
 
 /// How the rays of a view run.
@@ -47,8 +47,8 @@ struct Row {
 }
 
 /// An affine function of a place in the picture, in pixels.
-#[derive(Clone, Copy, Debug)]
-struct Linear {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Linear {
     base: DVec3,
     by_column: DVec3,
     by_row: DVec3,

@@ -45,6 +45,7 @@
 
 mod batch;
 mod bin;
+mod blank;
 mod casters;
 mod clip;
 mod color;

@@ -2,6 +2,7 @@
 
 use crate::batch::{Ask, Batch, Manner, NO_FACE};
 use crate::bin::Bins;
+use crate::blank::{Blank, Stays};
 use crate::drawing::Drawing;
 use crate::face::Faces;
 use crate::gouraud::Gouraud;
@@ -30,6 +31,7 @@ pub(crate) struct Painter<'a> {
     pub(crate) light: Illumination<'a>,
     pub(crate) lens: &'a Lens,
     pub(crate) bins: &'a Bins,
+    blank: &'a Blank,
     /// The lines to draw instead of light.
     pub(crate) drawing: Option<Drawing<'a>>,
     pub(crate) places: &'a [[i32; 2]],
@@ -81,6 +83,7 @@ impl<'a> Painter<'a> {
         look: Look<'a>,
         lens: &'a Lens,
         bins: &'a Bins,
+        blank: &'a Blank,
         channels: Channels,
     ) -> Self {
         let Look { shading, places, drawing } = look;
@@ -95,7 +98,7 @@ impl<'a> Painter<'a> {
             && (wants.color || channels.has(Channel::Normal))
             && light.scene.materials.iter().any(|material| material.normal_map.is_some());
         let manner = Manner { ask, shading, turns };
-        Self { light, lens, bins, drawing, places, wants, manner, channels }
+        Self { light, lens, bins, blank, drawing, places, wants, manner, channels }
     }
 
     /// Draws all bands, each with scratch memory of its own. Returns how many pixels were shaded.
@@ -164,10 +167,12 @@ impl<'a> Painter<'a> {
         scratch: &mut Scratch,
     ) -> u64 {
         let area = grid.area(tile);
-        if self.drawing.is_none() && self.bins.is_empty(tile) {
+        let is_blank = self.drawing.is_none() && self.bins.is_empty(tile);
+        let stays = self.blank.note(tile, is_blank);
+        if is_blank {
             // No closure: it would be compiled for the plain processor.
             for row in 0..area.height as u32 {
-                self.background_row(&area, row, band);
+                self.background_row(&area, row, stays, band);
             }
             return 0;
         }
@@ -185,7 +190,7 @@ impl<'a> Painter<'a> {
         for row in 0..area.height as u32 {
             let ids = &buffer.id[(row * TILE_WIDTH) as usize..][..area.width as usize];
             if ids.contains(&NO_TRIANGLE) {
-                self.background_row(&area, row, band);
+                self.background_row(&area, row, stays, band);
             }
         }
         let shaded = self.resolve(&area, &buffer, band, scratch);
@@ -267,17 +272,20 @@ impl<'a> Painter<'a> {
 
     /// Fills a row of a tile with what is seen where nothing is: most pixels of most pictures keep it.
     #[inline(always)]
-    fn background_row(&self, area: &TileArea, row: u32, band: &mut Band<'_>) {
+    fn background_row(&self, area: &TileArea, row: u32, stays: Stays, band: &mut Band<'_>) {
         let from = (row * band.width) as usize + area.x as usize;
         let pixels = from..from + area.width as usize;
         let nothing = Pixel::background(Vec3::ZERO);
-        if !band.color.is_empty() {
+        if !band.color.is_empty() && !stays.color {
             let place = (f64::from(area.x) + 0.5, f64::from(area.y as u32 + row) + 0.5);
             let first = self.lens.line(place.0, place.1).1;
             let step = (self.lens.line(place.0 + 1.0, place.1).1 - first).as_vec3();
             let directions = RowDirections { first: first.as_vec3(), step };
             let background = &self.light.scene.environment.background;
             directions.fill(background, 0, &mut band.color[pixels.clone()]);
+        }
+        if stays.nothing {
+            return;
         }
         fn fill<T: Copy>(plane: &mut [T], pixels: std::ops::Range<usize>, value: T) {
             if !plane.is_empty() {

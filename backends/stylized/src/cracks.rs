@@ -6,6 +6,7 @@
 //! planes cross at a place, and the square of the cosine to the eye falls evenly to zero where a round body ends.
 //! Cracks around a corner of pixels are joined.
 
+use crate::eight::difference;
 use crate::stroke::{Kind, Stroke};
 use crate::style::{Style, Styles};
 use glam::{DVec3, Vec3};
@@ -19,11 +20,8 @@ const JUMP: f32 = 0.01;
 /// Colors of one body that differ by less are of one material.
 const OTHER_COLOR: f32 = 0.02;
 
-/// Tells whether none of a few pixels shows an object: most pixels of most pictures do not, and are passed quickly.
-#[inline(always)]
-pub(crate) fn shows_nothing(ids: &[u32]) -> bool {
-    ids.iter().fold(0, |any, id| any | id) == 0
-}
+/// Pixels of which one look tells whether there may be a line: most of most pictures show nothing, or one body.
+const SPAN: usize = 64;
 
 /// What is looked at.
 pub(crate) struct Surfaces<'a> {
@@ -171,12 +169,23 @@ impl Surfaces<'_> {
         let next_distances = &plane.distance()[first + step..first + step + count];
         let normals = &plane.normal()[first..first + count];
         let next_normals = &plane.normal()[first + step..first + step + count];
+        let mut passes = false;
+        let is_plain = |id: u32| id == 0 || self.is_outlined(id);
         for begin in (0..count).step_by(LANES) {
+            let id = ids[begin];
+            if begin % SPAN == 0 {
+                let span = begin..(begin + SPAN).min(count);
+                let differ =
+                    difference::<SPAN>(&ids[span.clone()], id) | difference::<SPAN>(&next_ids[span], id);
+                passes = differ == 0 && is_plain(id);
+            }
+            if passes {
+                continue;
+            }
             let all = begin..(begin + LANES).min(count);
             let (here, next) = (&ids[all.clone()], &next_ids[all.clone()]);
-            let id = here[0];
-            let is_one = here.iter().zip(next).fold(0, |differ, (a, b)| differ | (a ^ id) | (b ^ id)) == 0;
-            if is_one && (id == 0 || self.is_outlined(id)) {
+            let is_one = difference::<LANES>(here, id) | difference::<LANES>(next, id) == 0;
+            if is_one && is_plain(id) {
                 continue;
             }
             let cosine = self.styles.all[usize::from(self.styles.index(id))].crease_cosine;

@@ -10,8 +10,71 @@ pub(crate) struct Eight {
     pub(crate) y: u32,
     pub(crate) count: usize,
     pub(crate) first: usize,
+    /// What is seen; nothing beyond the picture.
+    pub(crate) ids: [u32; LANES],
     /// Unit vectors from the eye.
     pub(crate) direction: Vec3x8,
+}
+
+/// Reads the ids of up to eight pixels; the rest show nothing.
+#[inline(always)]
+pub(crate) fn ids(from: &[u32], first: usize, count: usize) -> [u32; LANES] {
+    let mut all = [0; LANES];
+    if count == LANES {
+        all.copy_from_slice(&from[first..first + LANES]);
+    } else {
+        all[..count].copy_from_slice(&from[first..first + count]);
+    }
+    all
+}
+
+/// Returns the bits that any of some ids has. Counts are constant where they can be: of loops whose ends it does not
+/// know the compiler makes no vectors so short.
+#[inline(always)]
+pub(crate) fn union<const N: usize>(ids: &[u32]) -> u32 {
+    let mut any = 0;
+    if let Ok(all) = <&[u32; N]>::try_from(ids) {
+        for id in all {
+            any |= id;
+        }
+    } else {
+        for id in ids {
+            any |= id;
+        }
+    }
+    any
+}
+
+/// Returns the bits in which any of some ids differ from one.
+#[inline(always)]
+pub(crate) fn difference<const N: usize>(ids: &[u32], one: u32) -> u32 {
+    let mut any = 0;
+    if let Ok(all) = <&[u32; N]>::try_from(ids) {
+        for id in all {
+            any |= id ^ one;
+        }
+    } else {
+        for id in ids {
+            any |= id ^ one;
+        }
+    }
+    any
+}
+
+/// Tells whether any of some pixels shows nothing.
+#[inline(always)]
+pub(crate) fn lacks<const N: usize>(ids: &[u32]) -> bool {
+    let mut any = 0;
+    if let Ok(all) = <&[u32; N]>::try_from(ids) {
+        for id in all {
+            any |= u32::from(*id == 0);
+        }
+    } else {
+        for id in ids {
+            any |= u32::from(*id == 0);
+        }
+    }
+    any != 0
 }
 
 /// Reads up to eight vectors; the rest are zero.

@@ -88,7 +88,7 @@ impl Buffers {
         let view = camera.view(visible.width(), visible.height());
         let straight = keeps_lines(&camera.projection);
         if straight {
-            let sight = Sight { camera, view, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
+            let sight = Sight { camera, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
             outline.fill(&outlines.bodies, &sight, control.threads);
         } else {
             outline.clear();
@@ -112,8 +112,9 @@ impl Buffers {
             }
         });
         control.check()?;
-        lines.strokes.extend(outline.strokes());
-        lines.strokes.extend(cracks.iter().flat_map(|c| &c.strokes));
+        for strokes in outline.strokes().chain(cracks.iter().map(|c| &c.strokes[..])) {
+            lines.strokes.extend_from_slice(strokes);
+        }
         Ok(())
     }
 

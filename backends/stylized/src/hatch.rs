@@ -78,6 +78,8 @@ pub(crate) struct Hatching {
     /// Darkness at which a stroke of each order begins, for both families, and by what that changes until the next map;
     /// the first is for order 0.
     begins: [[[f32; 2]; MOST_LEVELS]; 2],
+    /// Beyond this order nothing changes in each family.
+    distinct: [usize; 2],
     /// The least of those of each family.
     earliest: [f32; 2],
     /// Darkness in which a stroke grows to its width.
@@ -149,6 +151,10 @@ impl Hatching {
             texture: float("hatch.texture"),
             half_width: float("hatch.width") * thickness,
             begins,
+            distinct: begins.map(|family| {
+                let last = family[MOST_LEVELS - 1];
+                family.iter().rposition(|of| *of != last).map_or(0, |order| order + 1)
+            }),
             earliest: begins
                 .map(|family| family.into_iter().map(|[begin, _]| begin).fold(f32::MAX, f32::min)),
             ramp: 1.0 / ramp.max(0.01),
@@ -291,14 +297,19 @@ impl Hatching {
             if !darkness.above(F32x8::splat(self.earliest[family])).any() {
                 continue;
             }
-            let (mut begin, mut change, mut stays) = (zero, zero, Mask8::NONE);
+            let mut order = zero;
             for i in 0..LANES {
-                let order = (texels[i] >> (8 + 16 * family) & 7) as usize;
-                [begin.0[i], change.0[i]] = self.begins[family][order];
+                order.0[i] = (texels[i] >> (8 + 16 * family) & 7) as i32 as f32;
             }
-            for i in 0..LANES {
-                stays.0[i] = if texels[i] >> (8 + 16 * family) & 7 == 0 { 0 } else { u32::MAX };
+            // Few orders differ: to choose among them takes less than to look each pixel's up.
+            let begins = &self.begins[family];
+            let [mut begin, mut change] = begins[0].map(F32x8::splat);
+            for (k, [begins, changes]) in (1u8..).zip(&begins[1..=self.distinct[family]]) {
+                let reaches = order.at_least(F32x8::splat(f32::from(k)));
+                begin = reaches.pick(F32x8::splat(*begins), begin);
+                change = reaches.pick(F32x8::splat(*changes), change);
             }
+            let stays = order.at_least(one);
             let thins = stays.pick(one, one - way);
             let grown = ((darkness - begin - change * way) * ramp).max(zero).min(one);
             let grown = if self.set == Set::Dots { grown.sqrt() } else { grown };

@@ -1,6 +1,6 @@
 //! How do highlights and strokes get onto eight pixels?
 
-use crate::eight::{Eight, numbers};
+use crate::eight::{Eight, difference, numbers};
 use crate::hatch::{EDGE, Hatching, Sticks};
 use crate::look::Look;
 use crate::paint::Painting;
@@ -21,20 +21,19 @@ impl Painting<'_> {
         cosine: F32x8,
         color: Vec3x8,
     ) -> Vec3x8 {
-        let Eight { x, y, count, first, direction } = *eight;
+        let Eight { x, y, count, first, ids, direction } = *eight;
         let zero = F32x8::ZERO;
         if !cosine.above(zero).any() {
             return color;
         }
-        let ids = &self.visible.id()[first..first + count];
         let look = |id: u32| &self.looks[(id.wrapping_sub(1) as usize).min(self.looks.len() - 1)];
         let first_look = look(ids[0].max(1));
         let mut strength = F32x8::splat(first_look.specular);
         let mut faint = F32x8::splat(first_look.faint);
         let mut shininess = [first_look.shininess; LANES];
-        if ids.iter().any(|&id| id != ids[0]) {
-            for (lane, &id) in ids.iter().enumerate() {
-                let look = look(id);
+        if difference::<LANES>(&ids, ids[0]) != 0 {
+            for (lane, id) in ids.into_iter().enumerate() {
+                let look = look(id.max(1));
                 (strength.0[lane], faint.0[lane], shininess[lane]) =
                     (look.specular, look.faint, look.shininess);
             }
@@ -86,7 +85,7 @@ impl Painting<'_> {
         (own, coded, normal, cosine): (Vec3x8, Vec3x8, Vec3x8, F32x8),
         color: Vec3x8,
     ) -> Vec3x8 {
-        let Eight { x, y, count, first, direction } = *eight;
+        let Eight { x, y, count, first, ids, direction } = *eight;
         let (one, half) = (F32x8::splat(1.0), F32x8::splat(0.5));
         let mut light = (one + cosine) * half;
         if hatching.texture > 0.0 {
@@ -95,7 +94,6 @@ impl Painting<'_> {
             light = light * (one - dark * F32x8::splat(hatching.texture));
         }
         let darkness = one - light;
-        let ids = &self.visible.id()[first..first + count];
         if !darkness.above(F32x8::splat(hatching.lightest)).any() {
             return color;
         }
@@ -112,12 +110,13 @@ impl Painting<'_> {
             let is_parallel = matches!(self.camera.projection, Projection::Orthographic { .. });
             let pixels = if is_parallel { F32x8::splat(pixel) } else { distance * F32x8::splat(pixel) };
             let mut lane = 0;
-            let is_one = ids.iter().fold(0, |differ, id| differ | (id ^ ids[0])) == 0;
             // Run by run of one object.
             while lane < count {
                 let id = ids[lane];
-                let other = (lane + 1..count).find(|&next| !is_one && ids[next] != id);
-                let end = other.unwrap_or(count);
+                let mut end = lane + 1;
+                while end < count && ids[end] == id {
+                    end += 1;
+                }
                 let index = (id.wrapping_sub(1) as usize).min(self.looks.len() - 1);
                 if id != 0 {
                     let look = &self.looks[index];
@@ -158,7 +157,7 @@ impl Run<'_> {
     fn ink(self, hatching: &Hatching, darkness: F32x8, ink: &mut F32x8) {
         let Self { look, lanes, place, normal, pixels, coordinates } = self;
         let texels = pixels * F32x8::splat(look.repeats * EDGE as f32);
-        let mut covered = F32x8::ZERO;
+        let mut covered;
         if let Some(coordinates) = coordinates {
             // A texture is taken to be laid once around the body: six periods.
             let scale = F32x8::splat(6.0 / hatching.scale);
@@ -185,27 +184,17 @@ impl Run<'_> {
                 / (most * F32x8::splat(0.3)).max(F32x8::splat(1e-20)))
             .max(zero)
             .min(F32x8::splat(0.5));
-            let is_first = [weights[0].at_least(most), weights[1].at_least(most), weights[2].at_least(most)];
-            let is_last =
-                [least.at_least(weights[0]), least.at_least(weights[1]), least.at_least(weights[2])];
-            let mut first = [Mask8::NONE; 3];
-            let mut second = [Mask8::NONE; 3];
-            first[0] = is_first[0];
-            first[1] = is_first[1] & !first[0];
-            first[2] = !(first[0] | first[1]);
-            for axis in 0..3 {
-                second[axis] = !first[axis] & !is_last[axis];
-            }
-            let planes = [(p.z, -p.y), (p.x, p.z), (p.x, -p.y)];
-            let mixes = mix.above(zero).any();
-            for (chosen, share, needed) in [(first, F32x8::splat(1.0) - mix, true), (second, mix, mixes)] {
-                if !needed {
-                    continue;
-                }
-                let pick = |a: F32x8, b: F32x8, c: F32x8| chosen[0].pick(a, chosen[1].pick(b, c));
-                let u = pick(planes[0].0, planes[1].0, planes[2].0);
-                let v = pick(planes[0].1, planes[1].1, planes[2].1);
-                covered = covered + hatching.ink(&u, &v, &texels, &darkness) * share;
+            let planes = Planes { u: [p.z, p.x, p.x], v: [-p.y, p.z, -p.y] };
+            let is_x = weights[0].at_least(most);
+            let is_y = weights[1].at_least(most) & !is_x;
+            let [u, v] = planes.across(is_x, is_y);
+            covered = hatching.ink(&u, &v, &texels, &darkness) * (F32x8::splat(1.0) - mix);
+            if mix.above(zero).any() {
+                // Neither that axis nor the one that it faces least.
+                let is_x = !is_x & !least.at_least(weights[0]);
+                let is_y = !is_y & !least.at_least(weights[1]);
+                let [u, v] = planes.across(is_x, is_y);
+                covered = covered + hatching.ink(&u, &v, &texels, &darkness) * mix;
             }
         }
         if lanes.len() == LANES {
@@ -215,6 +204,23 @@ impl Run<'_> {
         for lane in lanes {
             ink.0[lane] = covered.0[lane];
         }
+    }
+}
+
+/// Places on the planes across the three axes.
+struct Planes {
+    u: [F32x8; 3],
+    v: [F32x8; 3],
+}
+
+impl Planes {
+    /// Returns places on the plane across x, across y, or across z, lane by lane.
+    #[inline(always)]
+    fn across(&self, is_x: Mask8, is_y: Mask8) -> [F32x8; 2] {
+        [
+            is_x.pick(self.u[0], is_y.pick(self.u[1], self.u[2])),
+            is_x.pick(self.v[0], is_y.pick(self.v[1], self.v[2])),
+        ]
     }
 }
 

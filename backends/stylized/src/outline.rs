@@ -13,7 +13,7 @@ use crate::stroke::{Kind, Stroke};
 use crate::style::{Style, Styles};
 use crate::veil::Veil;
 use glam::{DAffine3, DVec3, Vec3};
-use polyptych_core::camera::{Camera, Projection, View};
+use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::framebuffer::Framebuffer;
 use polyptych_core::parallel::{Threads, for_each_mut};
 use std::sync::Arc;
@@ -63,7 +63,6 @@ struct Lens {
 /// What lines are looked for in.
 pub(crate) struct Sight<'a> {
     pub(crate) camera: &'a Camera,
-    pub(crate) view: View<'a>,
     pub(crate) visible: &'a Framebuffer,
     pub(crate) styles: &'a Styles,
     /// How large a pixel is at distance 1, or for parallel rays at any.
@@ -108,9 +107,9 @@ impl Scratch {
         });
     }
 
-    /// Lists the lines, in the order of bodies and edges.
-    pub(crate) fn strokes(&self) -> impl Iterator<Item = &Stroke> {
-        self.pieces.iter().flat_map(|piece| &piece.strokes)
+    /// Lists the lines piece by piece, in the order of bodies and edges.
+    pub(crate) fn strokes(&self) -> impl Iterator<Item = &[Stroke]> {
+        self.pieces.iter().map(|piece| &piece.strokes[..])
     }
 
     pub(crate) fn clear(&mut self) {
@@ -185,7 +184,9 @@ impl Piece {
                 continue;
             }
             let Some(kind) = kind_of(edge, turns, style) else { continue };
-            let [a, b] = edge.ends.map(|i| lens.ahead(body.edges.places[i as usize]));
+            let [a, b] = edge.ends;
+            let [a, b] = [&body.edges.places[a as usize], &body.edges.places[b as usize]];
+            let [a, b] = [lens.ahead(*a), lens.ahead(*b)];
             let line = Line { kind, style: style_index, object: body.object, dashes: style.dashes_hidden };
             trace(&lens, sight, veil, line, [a, b], &mut self.strokes);
         }
@@ -193,17 +194,21 @@ impl Piece {
 }
 
 /// Returns as what an edge is drawn, if it is.
+#[inline(always)]
 fn kind_of(edge: &crate::edges::Edge, turns: bool, style: &Style) -> Option<Kind> {
     let is_drawn = |kind: Kind| style.pen(kind).is_drawn;
     let is_fold = edge.is_crowded || edge.cosine < style.crease_cosine;
-    let kinds = [
-        (Kind::Silhouette, turns),
-        (Kind::Border, edge.faces[1] == NO_FACE),
-        (Kind::Crease, is_fold),
-        (Kind::Material, edge.parts_materials),
-        (Kind::Wire, true),
-    ];
-    kinds.into_iter().find(|&(kind, is)| is && is_drawn(kind)).map(|(kind, _)| kind)
+    if turns && is_drawn(Kind::Silhouette) {
+        Some(Kind::Silhouette)
+    } else if edge.faces[1] == NO_FACE && is_drawn(Kind::Border) {
+        Some(Kind::Border)
+    } else if is_fold && is_drawn(Kind::Crease) {
+        Some(Kind::Crease)
+    } else if edge.parts_materials && is_drawn(Kind::Material) {
+        Some(Kind::Material)
+    } else {
+        is_drawn(Kind::Wire).then_some(Kind::Wire)
+    }
 }
 
 /// What is the same along an edge.
@@ -294,7 +299,7 @@ fn trace(
     strokes: &mut Vec<Stroke>,
 ) {
     let Some([a, b]) = lens.clip(a, b) else { return };
-    let [from, to] = [a, b].map(|p| lens.pixel(p));
+    let [from, to] = [lens.pixel(a), lens.pixel(b)];
     let (across, down) = (to[0] - from[0], to[1] - from[1]);
     let length = (across * across + down * down).sqrt();
     if !length.is_finite() || length > 1e5 {
@@ -302,11 +307,21 @@ fn trace(
     }
     let count = length.ceil().max(1.0) as usize;
     let at = |part: f64| [from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part];
+    let end = |i: usize| {
+        let [x, y] = at(i as f64 / count as f64);
+        [x as f32, y as f32]
+    };
     let mut put = |first: usize, last: usize, is_seen: bool| {
         if is_seen || line.dashes {
-            let [from, to] = [first, last].map(|i| at(i as f64 / count as f64).map(|c| c as f32));
             let Line { kind, style, object, .. } = line;
-            strokes.push(Stroke { from, to, kind, style, is_hidden: !is_seen, object });
+            strokes.push(Stroke {
+                from: end(first),
+                to: end(last),
+                kind,
+                style,
+                is_hidden: !is_seen,
+                object,
+            });
         }
     };
     let nearest = (-a.z).min(-b.z);
@@ -314,15 +329,15 @@ fn trace(
         return put(0, count, false);
     }
     // Equal steps on the picture are equal steps on a plane before the eye, and of one over the depth.
-    let flat = |p: DVec3| if lens.is_parallel { p } else { DVec3::new(p.x / -p.z, p.y / -p.z, 1.0 / -p.z) };
+    let flat = |p: DVec3| if lens.is_parallel { p } else { DVec3::new(p.x, p.y, 1.0) / -p.z };
     let (flat_a, flat_b) = (flat(a), flat(b));
     let ends = line.kind == Kind::Silhouette;
     let (mut begin, mut state, mut i) = (0, None, 0);
     while i < count {
         let part = (i as f64 + 0.5) / count as f64;
         let p = flat_a + (flat_b - flat_a) * part;
-        let place = if lens.is_parallel { p } else { DVec3::new(p.x, p.y, -1.0) / p.z };
-        let seen = sight.sees(at(part), place, lens.is_parallel, ends);
+        let place = if lens.is_parallel { p } else { DVec3::new(p.x, p.y, -1.0) * (1.0 / p.z) };
+        let seen = sight.sees(at(part), place, lens, ends);
         let is_seen = seen == Seen::Yes;
         if state != Some(is_seen) {
             if let Some(was) = state {
@@ -358,10 +373,10 @@ impl Sight<'_> {
     /// Tells whether nothing hides a place of an edge: `pixel` is where it is on the picture, `place` where in camera
     /// space; `ends` for one at which the body ends.
     #[inline(always)]
-    fn sees(&self, pixel: [f64; 2], place: DVec3, is_parallel: bool, ends: bool) -> Seen {
+    fn sees(&self, pixel: [f64; 2], place: DVec3, lens: &Lens, ends: bool) -> Seen {
         let (width, height) = (self.visible.width() as i32, self.visible.height() as i32);
-        let distance = if is_parallel { -place.z } else { place.length() };
-        let size = if is_parallel { self.pixel } else { self.pixel * distance };
+        let distance = if lens.is_parallel { -place.z } else { place.length() };
+        let size = if lens.is_parallel { self.pixel } else { self.pixel * distance };
         // Beyond the picture's edge nothing is known: what is there is judged by the nearest pixels, and generously.
         let is_outside = pixel[0] < 0.5
             || pixel[1] < 0.5
@@ -369,62 +384,78 @@ impl Sight<'_> {
             || pixel[1] > f64::from(height) - 0.5;
         let allowed = if is_outside { 24.0 } else { 1.5 } * size + 1e-5 * distance;
         let (x, y) = ((pixel[0] - 0.5).floor() as i32, (pixel[1] - 0.5).floor() as i32);
-        let [left, right] = [x, x.saturating_add(1)].map(|x| x.clamp(0, width - 1));
-        let [top, bottom] = [y, y.saturating_add(1)].map(|y| y.clamp(0, height - 1));
-        let index = |x: i32, y: i32| y as usize * width as usize + x as usize;
+        let column = |x: i32| x.clamp(0, width - 1) as usize;
+        let row = |y: i32| y.clamp(0, height - 1) as usize * width as usize;
+        let (left, right, top, bottom) =
+            (column(x), column(x.saturating_add(1)), row(y), row(y.saturating_add(1)));
+        let around = [top + left, top + right, bottom + left, bottom + right];
         let seen = self.visible.distance();
-        let around = [index(left, top), index(right, top), index(left, bottom), index(right, bottom)];
+        let most = seen[around[0]].max(seen[around[1]]).max(seen[around[2]].max(seen[around[3]]));
         let nearest_allowed = (distance - allowed) as f32;
-        if around.iter().any(|&i| seen[i] >= nearest_allowed) {
+        if most >= nearest_allowed {
             return Seen::Yes;
         }
         // A line at which a body ends may lie a little within its outline on the picture, as faces are flat: it is seen
         // where a pixel next to those shows what is behind.
-        let (x, y) = (pixel[0].floor() as i32, pixel[1].floor() as i32);
-        let beyond =
-            |k: i32| index((x + k % 3 - 1).clamp(0, width - 1), (y + k / 3 - 1).clamp(0, height - 1));
-        if ends && (0..9).any(|k| seen[beyond(k)] >= nearest_allowed) {
-            return Seen::Yes;
+        if ends {
+            let (x, y) = (pixel[0].floor() as i32, pixel[1].floor() as i32);
+            let (left, middle, right) = (column(x.saturating_sub(1)), column(x), column(x.saturating_add(1)));
+            let mut most = 0.0f32;
+            for y in y.saturating_sub(1)..=y.saturating_add(1) {
+                let row = row(y);
+                most = most.max(seen[row + left].max(seen[row + middle]).max(seen[row + right]));
+            }
+            if most >= nearest_allowed {
+                return Seen::Yes;
+            }
         }
         // The surface of a pixel may run away from the eye. A plane says little far from its pixel, though.
         let far = (distance - allowed - 24.0 * size) as f32;
-        if around.iter().all(|&i| seen[i] < far) {
+        if most < far {
             return Seen::FarBehind;
         }
-        let is_on_plane =
-            around.iter().any(|&i| self.predicts(i, place, (distance, size, allowed), is_parallel));
+        let limits = (distance, size, distance - allowed);
+        let (x, y) = (x.clamp(-1, width), y.clamp(-1, height));
+        let is_on_plane = self.predicts((x, y), place, limits, lens)
+            || self.predicts((x + 1, y), place, limits, lens)
+            || self.predicts((x, y + 1), place, limits, lens)
+            || self.predicts((x + 1, y + 1), place, limits, lens);
         if is_on_plane { Seen::Yes } else { Seen::No }
     }
 
-    /// Tells whether the plane of a pixel does not hide a place.
+    /// Tells whether the plane of what a pixel shows does not hide a place.
+    #[inline(always)]
     fn predicts(
         &self,
-        i: usize,
+        (x, y): (i32, i32),
         place: DVec3,
-        (distance, size, allowed): (f64, f64, f64),
-        is_parallel: bool,
+        (distance, size, limit): (f64, f64, f64),
+        lens: &Lens,
     ) -> bool {
-        let width = self.visible.width() as usize;
+        let [x, y] =
+            [x.clamp(0, self.visible.width() as i32 - 1), y.clamp(0, self.visible.height() as i32 - 1)];
+        let i = y as usize * self.visible.width() as usize + x as usize;
         let found = f64::from(self.visible.distance()[i]);
-        let direction = if is_parallel {
-            self.camera.forward()
-        } else {
-            self.camera.world_from_camera * place / distance
-        };
-        let normal = self.visible.normal()[i].as_dvec3();
-        let slope = normal.dot(direction);
-        if slope > -1e-3 || found + 24.0 * size < distance - allowed {
+        if found + 24.0 * size < limit {
             return false;
         }
-        let Some(ray) = self.view.ray((i % width) as f64 + 0.5, (i / width) as f64 + 0.5) else {
+        // All in camera space.
+        let (normal, axes) = (self.visible.normal()[i].as_dvec3(), &self.camera.world_from_camera);
+        let normal = DVec3::new(axes.x_axis.dot(normal), axes.y_axis.dot(normal), axes.z_axis.dot(normal));
+        let slope = if lens.is_parallel { -normal.z } else { normal.dot(place) / distance };
+        if slope > -1e-3 {
             return false;
-        };
-        let origin = if is_parallel {
-            self.camera.eye + self.camera.world_from_camera * DVec3::new(place.x, place.y, 0.0)
+        }
+        let middle = DVec3::new(
+            ((f64::from(x) + 0.5) * 2.0 / lens.size[0] - 1.0) * lens.half[0],
+            (1.0 - (f64::from(y) + 0.5) * 2.0 / lens.size[1]) * lens.half[1],
+            -1.0,
+        );
+        let predicted = if lens.is_parallel {
+            normal.dot(DVec3::new(middle.x - place.x, middle.y - place.y, -found)) / slope
         } else {
-            ray.origin
+            normal.dot(middle) * found / (middle.length() * slope)
         };
-        let predicted = normal.dot(ray.at(found) - origin) / slope;
-        predicted.min(found + 24.0 * size) >= distance - allowed
+        predicted.min(found + 24.0 * size) >= limit
     }
 }

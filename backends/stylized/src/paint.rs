@@ -1,7 +1,6 @@
 //! From visible surfaces to colors: tone, highlights, strokes, paper, and lines on top, row by row.
 
-use crate::cracks::shows_nothing;
-use crate::eight::{Eight, gather, numbers, steepness};
+use crate::eight::{Eight, gather, ids, lacks, numbers, steepness, union};
 use crate::ink::{Ink, Sheaf};
 use crate::light::Lighting;
 use crate::look::Look;
@@ -16,8 +15,8 @@ use polyptych_core::shade::fogged;
 
 /// Rows drawn by one worker at a time.
 pub(crate) const ROWS: u32 = 32;
-/// Columns whose background is filled at once.
-const GROUND: usize = 64;
+/// Columns that are looked at, and whose background is filled, at once.
+const SPAN: usize = 64;
 /// Columns over which its color changes evenly.
 const EVEN: usize = 16;
 
@@ -78,23 +77,6 @@ impl Painting<'_> {
         let Scratch { facing, ink } = scratch;
         let stride = width as usize + 2 * LANES;
         facing.resize(stride * (ROWS as usize + 2), 0.0);
-        if self.styles.all[0].show == Show::Style {
-            let steps = self.styles.all.iter().any(|s| s.tone.steps > 1);
-            let around = u32::from(steps);
-            let rows = first.saturating_sub(around)..(first + band.rows + around).min(self.visible.height());
-            for y in rows {
-                let row = (y + 1 - first) as usize * stride;
-                self.face(y, &mut facing[row..row + stride]);
-            }
-            // Beyond the picture it goes on as it is.
-            if first == 0 {
-                facing.copy_within(stride..2 * stride, 0);
-            }
-            if first + band.rows == self.visible.height() {
-                let last = band.rows as usize * stride;
-                facing.copy_within(last..last + stride, last + stride);
-            }
-        }
         let lines = self.styles.draw_lines();
         if lines {
             ink.clear(width, band.rows);
@@ -102,8 +84,26 @@ impl Painting<'_> {
                 ink.draw(stroke, self.styles, first, band.rows);
             }
         }
+        let (shades, height) = (self.styles.all[0].show == Show::Style, self.visible.height());
+        // Edges of steps are as wide as the rows around say.
+        let around = u32::from(self.styles.all.iter().any(|s| s.tone.steps > 1));
+        let mut next = first.saturating_sub(around);
         for row in 0..band.rows {
             let y = first + row;
+            // No sooner than they are asked for: what they are reckoned from is read again when the row is painted, and
+            // should still be near.
+            while shades && next <= (y + around).min(height - 1) {
+                let begin = (next + 1 - first) as usize * stride;
+                self.face(next, &mut facing[begin..begin + stride]);
+                // Beyond the picture it goes on as it is.
+                if next == 0 {
+                    facing.copy_within(stride..2 * stride, 0);
+                }
+                if next + 1 == height {
+                    facing.copy_within(begin..begin + stride, begin + stride);
+                }
+                next += 1;
+            }
             let colors = &mut band.color[(row * width) as usize..((row + 1) * width) as usize];
             self.row(y, (row as usize + 1) * stride, stride, facing, colors);
             if lines {
@@ -119,10 +119,15 @@ impl Painting<'_> {
         let row = y as usize * width;
         let ids = &self.visible.id()[row..row + width];
         let directions = self.view.row(y);
+        let (mut is_empty, mut is_full) = (false, false);
         for x in (0..width).step_by(LANES) {
             let count = (width - x).min(LANES);
+            if x % SPAN == 0 {
+                let span = &ids[x..width.min(x + SPAN)];
+                (is_empty, is_full) = (union::<SPAN>(span) == 0, !lacks::<SPAN>(span));
+            }
             let out = &mut facing[LANES + x..LANES + x + LANES];
-            if shows_nothing(&ids[x..x + count]) {
+            if is_empty || !is_full && union::<LANES>(&ids[x..x + count]) == 0 {
                 out.fill(0.0);
                 continue;
             }
@@ -188,32 +193,46 @@ impl Painting<'_> {
         let directions = self.view.row(y);
         let paper = &self.styles.all[0].paper;
         let row = y as usize * width;
-        let ids = &self.visible.id()[row..row + width];
-        for (piece, (ids, colors)) in ids.chunks(GROUND).zip(colors.chunks_mut(GROUND)).enumerate() {
-            if ids.contains(&0) {
-                self.ground(paper, (piece * GROUND) as u32, y, directions.as_ref(), colors);
-            }
-        }
+        let seen = &self.visible.id()[row..row + width];
+        let (mut is_empty, mut is_full) = (false, false);
         for x in (0..width).step_by(LANES) {
+            if x % SPAN == 0 {
+                let span = x..width.min(x + SPAN);
+                let ids = &seen[span.clone()];
+                (is_empty, is_full) = (union::<SPAN>(ids) == 0, !lacks::<SPAN>(ids));
+                if !is_full {
+                    self.ground(paper, x as u32, y, directions.as_ref(), &mut colors[span]);
+                }
+            }
+            if is_empty {
+                continue;
+            }
             let count = (width - x).min(LANES);
-            let own_ids = &ids[x..x + count];
-            if shows_nothing(own_ids) {
+            let own_ids = ids(seen, x, count);
+            if !is_full && union::<LANES>(&own_ids) == 0 {
                 continue;
             }
             let (direction, origin) = self.rays(x, y, directions.as_ref());
-            let eight = Eight { x: x as u32, y, count, first: row + x, direction };
+            let eight = Eight { x: x as u32, y, count, first: row + x, ids: own_ids, direction };
             let around = [own + LANES + x, stride];
             let out = &mut colors[x..x + count];
-            // Mostly one style; each that is there paints its own pixels.
+            // Mostly one style paints all; where there are several, each paints its own pixels.
+            let is_whole = self.styles.all.len() == 1 && (is_full || !lacks::<LANES>(&own_ids));
             for (index, style) in (0u8..).zip(&self.styles.all) {
-                let is_own = |id: &u32| *id != 0 && self.styles.index(*id) == index;
-                if !own_ids.iter().any(is_own) {
+                let is_own = |id: u32| id != 0 && self.styles.index(id) == index;
+                if !is_whole && !own_ids.into_iter().any(is_own) {
                     continue;
                 }
                 let result = self.eight(style, &eight, origin, around, facing);
-                for (lane, (color, id)) in out.iter_mut().zip(own_ids).enumerate() {
-                    if is_own(id) {
+                if let (true, Ok(out)) = (is_whole, <&mut [Vec3; LANES]>::try_from(&mut *out)) {
+                    for (lane, color) in out.iter_mut().enumerate() {
                         *color = result.get(lane);
+                    }
+                } else {
+                    for (lane, (color, id)) in out.iter_mut().zip(own_ids).enumerate() {
+                        if is_own(id) {
+                            *color = result.get(lane);
+                        }
                     }
                 }
             }
@@ -276,8 +295,7 @@ impl Painting<'_> {
         if style.show != Show::Style {
             return self.study(style.show, eight);
         }
-        let Eight { count, first, .. } = *eight;
-        let ids = &self.visible.id()[first..first + count];
+        let Eight { count, first, ids, .. } = *eight;
         let mut own = gather(self.visible.albedo(), first, count);
         let coded = own;
         if self.any_coded && ids.iter().any(|&id| self.look(id).is_coded) {
@@ -344,7 +362,7 @@ impl Painting<'_> {
     fn decode(&self, eight: &Eight, own: &mut Vec3x8) {
         let coordinates = *own;
         for lane in 0..eight.count {
-            let id = self.visible.id()[eight.first + lane];
+            let id = eight.ids[lane];
             if !self.look(id).is_coded {
                 continue;
             }

@@ -63,7 +63,8 @@ impl Tone {
         let n = F32x8::splat(self.steps as f32);
         let length = smooth.length();
         let s = length * n;
-        let change = smooth.dot(warm - cool).abs() * n * half * slope / length.max(F32x8::splat(1e-12));
+        let inverse = one / length.max(F32x8::splat(1e-12));
+        let change = smooth.dot(warm - cool).abs() * n * half * slope * inverse;
         let mut below = s;
         for i in 0..LANES {
             below.0[i] = s.0[i].floor();
@@ -71,7 +72,7 @@ impl Tone {
         let beyond = (s - below - half) / change.max(F32x8::splat(1e-6)) + half;
         let step = below + beyond.max(zero).min(one);
         let there: Mask8 = s.above(zero);
-        smooth.scaled(there.pick(step / s, zero))
+        smooth.scaled(there.pick(step * inverse * F32x8::splat(1.0 / self.steps as f32), zero))
     }
 }
 

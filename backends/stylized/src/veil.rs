@@ -59,10 +59,14 @@ impl Veil {
             return false;
         }
         let nearest = distance as f32;
-        down.into_iter().all(|y| {
-            let row = &self.farthest[y * self.columns..(y + 1) * self.columns];
-            row[across.clone()].iter().all(|&farthest| farthest < nearest)
-        })
+        for y in down {
+            for &farthest in &self.farthest[y * self.columns + across.start..y * self.columns + across.end] {
+                if farthest >= nearest {
+                    return false;
+                }
+            }
+        }
+        true
     }
 
     pub(crate) fn bytes(&self) -> u64 {

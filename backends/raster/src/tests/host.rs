@@ -7,7 +7,7 @@ use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::parallel::{OneThread, Pool, Threads};
-use polyptych_core::scene::{Light, Material, Mesh, Primitive, Scene, Shape, Voxels};
+use polyptych_core::scene::{Background, Light, Material, Mesh, Primitive, Scene, Shape, Voxels};
 use polyptych_core::seam::{Control, Decision, Need, RenderError, Renderer};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -302,4 +302,49 @@ fn no_more_triangles_are_drawn_than_the_tolerance_asks_for() {
     assert!(f64::from(most) < 2.0 * bound, "{most} for {bound}");
     let (_, more, _) = draw("needed", 0.001);
     assert!(more > few, "{more} {few}");
+}
+
+#[test]
+fn what_stays_blank_is_right_whatever_happens_between_two_frames() {
+    let mut scene = scene_of(vec![(cube(1.0), [0.0; 3]), (cube(0.3), [1.4, 0.3, 0.0])]);
+    let (width, height) = (330, 200);
+    let mut need =
+        Need { channels: Channels::ALL, ..Need::new(camera([0.0, 0.5, 8.0], [0.0; 3]), width, height) };
+    let (mut raster, converter, control) = (Raster::new(), Converter::default(), Control::simple());
+    let mut picture = Framebuffer::new(width, height, Channels::ALL);
+    let mut other = Framebuffer::new(width, height, Channels::ALL);
+    let geometry = Channels::of(&[Channel::Distance, Channel::Id, Channel::Albedo]);
+    other.band().id.fill(7);
+    for step in 0..14 {
+        match step {
+            // The same camera, another scene.
+            2 => scene.objects[0].world_from_object.translation.x = 1.0,
+            3 => scene.environment.background = Background::Solid(Vec3::new(0.1, 0.5, 0.2)),
+            // Another camera that looks the same way, and one that does not.
+            4 => {
+                let (below, horizon, above) = (Vec3::X, Vec3::Y, Vec3::Z);
+                scene.environment.background = Background::Gradient { below, horizon, above };
+                need.camera.eye.x += 0.5;
+            }
+            5 => need.camera = camera([5.0, 2.0, 5.0], [0.0; 3]),
+            // Somebody else writes to all planes, exchanges some, or exchanges them to and fro.
+            6 => picture.band().color.fill(Vec3::ONE),
+            7 => picture.exchange(&mut other, Channels::of(&[Channel::Color])),
+            8 => picture.exchange(&mut other, geometry),
+            9 => {
+                picture.exchange(&mut other, geometry);
+                picture.exchange(&mut other, geometry);
+            }
+            10 => picture.touch(),
+            11 => need.camera.projection = Projection::Orthographic { height: 6.0 },
+            12 => need.camera.projection = Projection::Fisheye { fov: 2.0 },
+            13 => need.camera = camera([5.0, 2.0, 5.0], [0.0; 3]),
+            _ => {}
+        }
+        let shared = Arc::new(scene.clone());
+        raster.prepare(&shared, &need, &converter, &control).unwrap();
+        raster.render(&need.frame(), &mut picture, &control).unwrap();
+        let fresh = draw(&scene, need.camera.clone(), width, height);
+        assert!(picture.same_bits(&fresh), "step {step}");
+    }
 }
