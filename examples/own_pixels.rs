@@ -14,7 +14,7 @@ const WIDTH: u32 = 90;
 const HEIGHT: u32 = 60;
 
 /// Runs the example.
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = std::sync::Arc::new(polyptych::builtin::scene("polyhedra")?);
     let camera = scene.cameras.first().ok_or("a camera")?.1.clone();
     let need = Need { channels: Channels::COLOR, ..Need::new(camera, WIDTH, HEIGHT) };
