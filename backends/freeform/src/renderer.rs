@@ -4,6 +4,7 @@ use crate::bundle::TILE;
 use crate::form::Precision;
 use crate::frame::{FrameDrawing, Scratch};
 use crate::plan::plan;
+use crate::volume::Drawing;
 use crate::world::{Body, Geometry, World};
 use polyptych_core::convert::{Converter, Detail};
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
@@ -56,6 +57,33 @@ fn info() -> BackendInfo {
                 quality_axis: true,
             },
             Parameter {
+                name: "volume.gradients",
+                kind: ParameterKind::Choice { choices: &["found", "kept"] },
+                default: Value::Text("found".to_owned()),
+                unit: "",
+                help: "whether gradients of volumes are found for each sample, or kept with five times the memory",
+                tag: "volume.gradients",
+                quality_axis: false,
+            },
+            Parameter {
+                name: "volume.levels",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(false),
+                unit: "",
+                help: "whether volumes of which many samples are in a pixel are drawn from averages of samples",
+                tag: "volume.levels",
+                quality_axis: true,
+            },
+            Parameter {
+                name: "volume.surface",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(false),
+                unit: "",
+                help: "whether volumes are drawn as the surface where their opacity passes half of its greatest",
+                tag: "volume.surface",
+                quality_axis: false,
+            },
+            Parameter {
                 name: "roots.precision",
                 kind: ParameterKind::Choice { choices: &["single", "double"] },
                 default: Value::Text("single".to_owned()),
@@ -83,8 +111,8 @@ pub struct Freeform {
     /// What was built of each shape, under the address of the shape, which is kept alive.
     kept: HashMap<usize, (Arc<Shape>, Arc<Geometry>)>,
     world: Option<World>,
-    /// Step through volumes in units of their smallest spacing.
-    volume_step: f64,
+    /// How the volumes that are kept are drawn.
+    volumes: Drawing,
     scratch: Vec<Mutex<Scratch>>,
     bytes: u64,
 }
@@ -103,7 +131,7 @@ impl Freeform {
             info: info(),
             kept: HashMap::new(),
             world: None,
-            volume_step: 0.5,
+            volumes: Drawing { step: 0.5, keeps_gradients: false, has_levels: false, as_surface: false },
             scratch: Vec::new(),
             bytes: 0,
         }
@@ -111,6 +139,17 @@ impl Freeform {
 
     fn detail(&self, need: &Need, object: &Object) -> Detail {
         seam::detail(object, need, need.settings.int(&self.info.parameters, "detail.resolution") as u32)
+    }
+
+    /// How volumes are to be drawn.
+    fn drawing(&self, need: &Need) -> Drawing {
+        let (settings, declared) = (&need.settings, &self.info.parameters);
+        Drawing {
+            step: settings.float(declared, "volume.step"),
+            keeps_gradients: settings.text(declared, "volume.gradients") == "kept",
+            has_levels: settings.bool(declared, "volume.levels"),
+            as_surface: settings.bool(declared, "volume.surface"),
+        }
     }
 
     /// What a picture takes.
@@ -132,7 +171,7 @@ impl Freeform {
         if let Some((_, geometry)) = self.kept.get(&key) {
             return Ok((geometry.clone(), Decision::Exact));
         }
-        if let Some(geometry) = Geometry::of(&object.shape, self.volume_step) {
+        if let Some(geometry) = Geometry::of(&object.shape, self.volumes) {
             let geometry = Arc::new(geometry);
             self.kept.insert(key, (object.shape.clone(), geometry.clone()));
             return Ok((geometry, Decision::Exact));
@@ -176,8 +215,7 @@ impl Renderer for Freeform {
     fn plan(&self, scene: &Scene, need: &Need) -> Plan {
         let lights = scene.all_lights();
         let demand = self.demand(scene, need, &lights);
-        let step = need.settings.float(&self.info.parameters, "volume.step");
-        plan(scene, need, &demand, step, |object| self.detail(need, object))
+        plan(scene, need, &demand, self.drawing(need), |object| self.detail(need, object))
     }
 
     fn prepare(
@@ -187,15 +225,15 @@ impl Renderer for Freeform {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
-        let volume_step = need.settings.float(&self.info.parameters, "volume.step");
+        let volumes = self.drawing(need);
         let precision = match need.settings.text(&self.info.parameters, "roots.precision") {
             "double" => Precision::Double,
             _ => Precision::Single,
         };
-        if volume_step != self.volume_step {
+        if volumes != self.volumes {
             // Opacities are kept for samples so far apart.
             self.kept.retain(|_, (_, geometry)| !matches!(**geometry, Geometry::Volume(_)));
-            self.volume_step = volume_step;
+            self.volumes = volumes;
         }
         // Shapes that are gone from the scene are let go.
         self.kept.retain(|_, (shape, _)| scene.objects.iter().any(|o| Arc::ptr_eq(&o.shape, shape)));

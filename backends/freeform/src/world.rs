@@ -4,7 +4,8 @@ use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::field;
 use crate::form::{Cast, FormBody, FormScratch, Precision};
 use crate::heights::{HeightBody, HeightScratch};
-use crate::volume::{Shine, VolumeBody};
+use crate::march::Shine;
+use crate::volume::{Drawing, VolumeBody};
 use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::convert::DistanceModel;
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
@@ -48,7 +49,7 @@ pub(crate) struct Body {
 /// Scratch memory of one worker for casting rays.
 #[derive(Default)]
 pub(crate) struct CastScratch {
-    form: FormScratch,
+    pub(crate) form: FormScratch,
     heights: HeightScratch,
 }
 
@@ -92,9 +93,9 @@ impl Points<'_> {
 }
 
 impl Geometry {
-    /// Builds what is cast of a shape that is drawn as given, with steps through volumes in units of their spacing;
-    /// nothing for meshes and voxels.
-    pub(crate) fn of(shape: &Shape, volume_step: f64) -> Option<Self> {
+    /// Builds what is cast of a shape that is drawn as given, volumes as told; nothing for meshes and
+    /// voxels.
+    pub(crate) fn of(shape: &Shape, volumes: Drawing) -> Option<Self> {
         Some(match shape {
             Shape::Primitive(Primitive::Plane { width, depth }) => {
                 Self::Plane { width: *width, depth: *depth }
@@ -102,13 +103,13 @@ impl Geometry {
             Shape::Primitive(primitive) => Self::Form(FormBody::new(&FreeForm::from_primitive(primitive)?)),
             Shape::FreeForm(form) => Self::Form(FormBody::new(form)),
             Shape::HeightField(heights) => Self::Heights(HeightBody::new(heights)),
-            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume, volume_step)),
+            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume, volumes)),
             Shape::Mesh(_) | Shape::Voxels(_) => return None,
         })
     }
 
     /// Returns what [`Geometry::bytes`] will be for a shape that is drawn as given; nothing for others.
-    pub(crate) fn planned_bytes(shape: &Shape) -> u64 {
+    pub(crate) fn planned_bytes(shape: &Shape, volumes: Drawing) -> u64 {
         match shape {
             Shape::Primitive(Primitive::Plane { .. }) => 16,
             // A form as steps is as large as what is written of it here.
@@ -117,7 +118,7 @@ impl Geometry {
             }
             Shape::FreeForm(form) => FormBody::new(form).bytes(),
             Shape::HeightField(heights) => HeightBody::planned_bytes(heights),
-            Shape::Volume(volume) => VolumeBody::planned_bytes(volume),
+            Shape::Volume(volume) => VolumeBody::planned_bytes(volume, volumes),
             Shape::Mesh(_) | Shape::Voxels(_) => 0,
         }
     }
