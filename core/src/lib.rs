@@ -17,6 +17,7 @@ pub mod load;
 pub mod math;
 pub mod metrics;
 pub mod parallel;
+pub mod projector;
 pub mod scene;
 pub mod seam;
 pub mod shade;

@@ -1,6 +1,7 @@
 //! A picture, tile by tile: what is met first, then what is seen through, then the light on it.
 
 use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, Sides, TILE};
+use crate::edges::Fine;
 use crate::layers;
 use crate::light::{Illumination, Lit};
 use crate::march::Gathered;
@@ -28,6 +29,7 @@ pub(crate) struct Scratch {
     pub(crate) form: CastScratch,
     /// Parts of rays in volumes.
     pub(crate) inside: layers::Scratch,
+    pub(crate) fine: Fine,
     pub(crate) traced: u64,
 }
 
@@ -36,32 +38,48 @@ pub(crate) struct FrameDrawing<'a> {
     pub(crate) world: &'a World,
     pub(crate) view: View<'a>,
     pub(crate) channels: Channels,
+    /// Where in the view the first pixel of a band that begins at row 0 is.
+    pub(crate) corner: [u32; 2],
 }
 
 impl FrameDrawing<'_> {
+    /// Draws all tiles of a band.
+    pub(crate) fn draw(&self, band: &mut Band<'_>, scratch: &mut Scratch) {
+        let mut lit = [Lit::NOTHING; OCTETS];
+        for first in (0..band.width).step_by(TILE as usize) {
+            self.draw_tile(band, first, &mut lit, scratch);
+        }
+    }
+
     /// Draws a band, tile by tile; stops between tiles when the host wants to.
-    pub(crate) fn band(&self, mut band: Band<'_>, scratch: &mut Scratch, control: &Control<'_>) {
+    pub(crate) fn band(&self, band: &mut Band<'_>, scratch: &mut Scratch, control: &Control<'_>) {
         scratch.traced = 0;
         let mut lit = [Lit::NOTHING; OCTETS];
         for first in (0..band.width).step_by(TILE as usize) {
             if control.is_cancelled() {
                 return;
             }
-            #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
-                #[expect(
-                    unsafe_code,
-                    reason = "a kernel compiled for a processor feature can only be called so"
-                )]
-                // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-                unsafe {
-                    self.tile_avx2(&mut band, first, &mut lit, scratch);
-                }
-                continue;
-            }
-            self.tile(&mut band, first, &mut lit, scratch);
+            self.draw_tile(band, first, &mut lit, scratch);
         }
-        control.finished(&band);
+    }
+
+    fn draw_tile<'a>(
+        &'a self,
+        band: &mut Band<'_>,
+        first: u32,
+        lit: &mut [Lit<'a>; OCTETS],
+        scratch: &mut Scratch,
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.tile_avx2(band, first, lit, scratch) };
+        }
+        self.tile(band, first, lit, scratch);
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -85,7 +103,7 @@ impl FrameDrawing<'_> {
         scratch: &mut Scratch,
     ) {
         // Where straight lines stay straight the corners bound all rays, which need not be known.
-        let straight = self.view.row(band.first_row).is_some();
+        let straight = self.view.row(band.first_row + self.corner[1]).is_some();
         let (cone, sides) = if straight {
             let corners = self.corners(band, first);
             let around = [1, 0, 2, 3].map(|i| (corners.origin.get(i), corners.direction.get(i)));
@@ -150,9 +168,10 @@ impl FrameDrawing<'_> {
     /// Returns the rays through the corners of a tile of a view that keeps straight lines straight.
     #[inline(always)]
     fn corners(&self, band: &Band<'_>, first: u32) -> Rays {
-        let mut x = F64x8::splat(f64::from(first));
-        (0..LANES).step_by(2).for_each(|i| x.0[i] = f64::from(band.width.min(first + TILE)));
-        let row = f64::from(band.first_row);
+        let [left, top] = self.corner;
+        let mut x = F64x8::splat(f64::from(left + first));
+        (0..LANES).step_by(2).for_each(|i| x.0[i] = f64::from(left + band.width.min(first + TILE)));
+        let row = f64::from(top + band.first_row);
         let (mut origin, mut direction, _) = self.view.rays(x, row);
         let lower = self.view.rays(x, row + f64::from(band.rows));
         for i in 0..2 {
@@ -172,10 +191,11 @@ impl FrameDrawing<'_> {
                 Pixels::NOTHING.put(band, column, row);
             }
             let begin = (row * band.width + first) as usize;
+            let directions = self.view.row(self.corner[1] + band.first_row + row);
             if let (Some(colors), Some(directions)) =
-                (band.color.get_mut(begin..begin + columns as usize), self.view.row(band.first_row + row))
+                (band.color.get_mut(begin..begin + columns as usize), directions)
             {
-                directions.fill(&self.world.scene.environment.background, first, colors);
+                directions.fill(&self.world.scene.environment.background, self.corner[0] + first, colors);
             }
         }
     }
@@ -184,11 +204,11 @@ impl FrameDrawing<'_> {
     #[inline(always)]
     fn background(&self, column: u32, row: u32, rays: &Rays) -> Vec3x8 {
         let background = &self.world.scene.environment.background;
-        let Some(directions) = self.view.row(row) else {
+        let Some(directions) = self.view.row(self.corner[1] + row) else {
             return background.gradient().colors(rays.direction.y.round()).finite();
         };
         let mut colors = [Vec3::ZERO; LANES];
-        directions.fill(background, column, &mut colors);
+        directions.fill(background, self.corner[0] + column, &mut colors);
         let mut all = Pixels::BLACK;
         for (lane, color) in colors.into_iter().enumerate() {
             all.set(lane, color);
@@ -203,8 +223,9 @@ impl FrameDrawing<'_> {
         for octet in 0..OCTETS {
             let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
             let mut x = F64x8::ZERO;
-            (0..LANES).for_each(|i| x.0[i] = f64::from(column + i as u32) + 0.5);
-            let (origin, direction, there) = self.view.rays(x, f64::from(band.first_row + row) + 0.5);
+            (0..LANES).for_each(|i| x.0[i] = f64::from(self.corner[0] + column + i as u32) + 0.5);
+            let y = f64::from(self.corner[1] + band.first_row + row) + 0.5;
+            let (origin, direction, there) = self.view.rays(x, y);
             let left = band.width.saturating_sub(column) as usize;
             let there = there & Mask8::first(if row < band.rows { left } else { 0 });
             let far = F64x8::pick(there, F64x8::splat(f64::INFINITY), F64x8::splat(-1.0));

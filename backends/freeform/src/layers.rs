@@ -1,10 +1,11 @@
 //! What lies before the opaque surfaces: see-through ones, layer by layer, and volumes between them?
 
 use crate::bundle::{Crossing, Hits, OCTETS, Rays};
-use crate::form::{Cast, clip};
+use crate::form::Cast;
 use crate::frame::{FrameDrawing, Pixels, Scratch as FrameScratch};
 use crate::light::Lit;
 use crate::march::{Gathered, March, OPAQUE};
+use crate::pyramid::clip;
 use crate::volume::VolumeBody;
 use crate::world::{Body, Geometry};
 use glam::DVec3;

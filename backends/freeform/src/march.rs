@@ -379,8 +379,9 @@ impl Place {
 fn is_outnumbered(some: Mask8, others: Mask8) -> bool {
     // Set lanes are -1 each. Added by halves, which the compiler does in registers.
     let mut sums = [0i32; LANES / 2];
-    for i in 0..LANES / 2 {
-        sums[i] = (some.0[i] as i32 - others.0[i] as i32) + (some.0[i + 4] as i32 - others.0[i + 4] as i32);
+    for (i, sum) in sums.iter_mut().enumerate() {
+        let [low, high] = [i, i + LANES / 2].map(|i| some.0[i] as i32 - others.0[i] as i32);
+        *sum = low + high;
     }
     sums[0] + sums[1] + (sums[2] + sums[3]) > 0 || !some.any()
 }

@@ -1,6 +1,6 @@
 //! What would be built for a need, and what would that cost?
 
-use crate::renderer::{converted, with_material};
+use crate::renderer::{converted, unconverted, with_material};
 use crate::volume::Drawing;
 use crate::world::Geometry;
 use polyptych_core::convert::{Converter, Detail};
@@ -86,7 +86,7 @@ fn plan_object(
         }
         (None, shape) => {
             let bytes = Geometry::planned_bytes(shape, volumes);
-            (with_material(scene, object, Decision::Exact), String::new(), bytes)
+            (with_material(scene, object, unconverted(shape, volumes)), String::new(), bytes)
         }
     };
     let bytes = if is_new { bytes } else { 0 };

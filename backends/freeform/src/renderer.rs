@@ -1,6 +1,7 @@
 //! The seam: what is prepared and kept, and one frame of it.
 
 use crate::bundle::TILE;
+use crate::edges::Edges;
 use crate::form::Precision;
 use crate::frame::{FrameDrawing, Scratch};
 use crate::plan::plan;
@@ -93,6 +94,15 @@ fn info() -> BackendInfo {
                 quality_axis: true,
             },
             Parameter {
+                name: "edge.rays",
+                kind: ParameterKind::Choice { choices: &["1", "2", "4", "8"] },
+                default: Value::Text("1".to_owned()),
+                unit: "rays",
+                help: "rays along each edge of a pixel in which edges or thin things may be",
+                tag: "edge.rays",
+                quality_axis: true,
+            },
+            Parameter {
                 name: "shadow",
                 kind: ParameterKind::Bool,
                 default: Value::Bool(true),
@@ -113,6 +123,8 @@ pub struct Freeform {
     world: Option<World>,
     /// How the volumes that are kept are drawn.
     volumes: Drawing,
+    /// Rays along each edge of a pixel in which there are edges.
+    edge_rays: u32,
     scratch: Vec<Mutex<Scratch>>,
     bytes: u64,
 }
@@ -132,6 +144,7 @@ impl Freeform {
             kept: HashMap::new(),
             world: None,
             volumes: Drawing { step: 0.5, keeps_gradients: false, has_levels: false, as_surface: false },
+            edge_rays: 1,
             scratch: Vec::new(),
             bytes: 0,
         }
@@ -152,6 +165,11 @@ impl Freeform {
         }
     }
 
+    /// Says how a shape is drawn that is not converted.
+    fn as_given(&self, shape: &Shape) -> Decision {
+        unconverted(shape, self.volumes)
+    }
+
     /// What a picture takes.
     fn demand(&self, scene: &Scene, need: &Need, lights: &[Light]) -> Demand {
         let switch = need.settings.bool(&self.info.parameters, "shadow");
@@ -169,17 +187,30 @@ impl Freeform {
     ) -> Result<(Arc<Geometry>, Decision), String> {
         let key = Arc::as_ptr(&object.shape) as usize;
         if let Some((_, geometry)) = self.kept.get(&key) {
-            return Ok((geometry.clone(), Decision::Exact));
+            return Ok((geometry.clone(), self.as_given(&object.shape)));
         }
         if let Some(geometry) = Geometry::of(&object.shape, self.volumes) {
             let geometry = Arc::new(geometry);
             self.kept.insert(key, (object.shape.clone(), geometry.clone()));
-            return Ok((geometry, Decision::Exact));
+            return Ok((geometry, self.as_given(&object.shape)));
         }
         let detail = self.detail(need, object);
         let model = converter.distance(scene, object, detail, control.threads).map_err(|e| e.reason)?;
         let decision = converted(object, model.bound, &model.why);
         Ok((Arc::new(Geometry::Field(model)), decision))
+    }
+}
+
+/// Says how a shape is drawn that is not converted.
+pub(crate) fn unconverted(shape: &Shape, volumes: Drawing) -> Decision {
+    match shape {
+        Shape::Volume(volume) if volumes.as_surface => {
+            let value = volume.transfer.surface_value();
+            Decision::Approximated {
+                why: format!("surface at value {value:.4}; what is translucent is lost"),
+            }
+        }
+        _ => Decision::Exact,
     }
 }
 
@@ -230,6 +261,7 @@ impl Renderer for Freeform {
             "double" => Precision::Double,
             _ => Precision::Single,
         };
+        self.edge_rays = need.settings.text(&self.info.parameters, "edge.rays").parse().unwrap_or(1);
         if volumes != self.volumes {
             // Opacities are kept for samples so far apart.
             self.kept.retain(|_, (_, geometry)| !matches!(**geometry, Geometry::Volume(_)));
@@ -282,19 +314,28 @@ impl Renderer for Freeform {
     ) -> Result<Report, RenderError> {
         let world = self.world.as_ref().ok_or(RenderError::NotPrepared)?;
         let mut phases = Phases::start();
-        let drawing = FrameDrawing {
-            world,
-            view: frame.camera.view(target.width(), target.height()),
-            channels: target.channels(),
-        };
+        let (width, height, rays) = (target.width(), target.height(), self.edge_rays);
+        let view = frame.camera.view(width, height);
+        let drawing = FrameDrawing { world, view, channels: target.channels(), corner: [0; 2] };
+        let fine_view = frame.camera.view(width.saturating_mul(rays), height.saturating_mul(rays));
+        let edges = Edges { world, view, fine_view, height, rays };
+        let shows = [Channel::Color, Channel::Coverage].iter().any(|&c| target.channels().has(c));
         let bands = target.height().div_ceil(TILE) as usize;
         if self.scratch.len() < bands {
             self.scratch.resize_with(bands, Mutex::default);
         }
         let scratch = &self.scratch;
-        target.for_each_band(control.threads, TILE, &|band| {
+        target.for_each_band(control.threads, TILE, &|mut band| {
             let own = &scratch[(band.first_row / TILE) as usize];
-            drawing.band(band, &mut own.lock().unwrap_or_else(PoisonError::into_inner), control);
+            let mut own = own.lock().unwrap_or_else(PoisonError::into_inner);
+            drawing.band(&mut band, &mut own, control);
+            if rays > 1 && shows && !control.is_cancelled() {
+                let more = edges.refine(&mut band, &mut own.fine);
+                own.traced += more;
+            }
+            if !control.is_cancelled() {
+                control.finished(&band);
+            }
         });
         control.check()?;
         phases.end("draw");

@@ -5,8 +5,9 @@ use crate::field;
 use crate::form::{Cast, FormBody, FormScratch, Precision};
 use crate::heights::{HeightBody, HeightScratch};
 use crate::march::Shine;
+use crate::surface;
 use crate::volume::{Drawing, VolumeBody};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use polyptych_core::convert::DistanceModel;
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
@@ -181,7 +182,7 @@ impl Body {
     }
 
     pub(crate) fn is_volume(&self) -> bool {
-        matches!(*self.geometry, Geometry::Volume(_))
+        matches!(&*self.geometry, Geometry::Volume(volume) if volume.surface.is_none())
     }
 
     /// Improves `hits` where a ray meets the surface sooner. Volumes have none.
@@ -194,7 +195,7 @@ impl Body {
         scratch: &mut CastScratch,
     ) {
         match (&*self.geometry, &*self.shape) {
-            (Geometry::Volume(_), _) => return,
+            (Geometry::Volume(volume), _) if volume.surface.is_none() => return,
             (Geometry::Form(form), _) => {
                 let cast = Cast {
                     object_from_world: &self.object_from_world,
@@ -221,8 +222,12 @@ impl Body {
                 if near > far {
                     continue;
                 }
-                let t = match &*self.geometry {
-                    Geometry::Field(model) => field::cast(model, origin, direction, near, far),
+                let t = match (&*self.geometry, &*self.shape) {
+                    (Geometry::Field(model), _) => field::cast(model, origin, direction, near, far),
+                    (
+                        Geometry::Volume(VolumeBody { levels, surface: Some(value), .. }),
+                        Shape::Volume(volume),
+                    ) => surface::cast(&levels[0], (volume, *value), origin, direction, [near, far]),
                     // The bounds of a plane are the plane.
                     _ => (direction.y != 0.0 && near > 0.0).then_some(near),
                 };
@@ -265,6 +270,7 @@ impl Body {
             } else {
                 (place.material.base_color, place.material.opacity)
             };
+            let c = place.color.unwrap_or(c);
             normal.set(i, place.normal);
             color.set(i, c);
             opacity.0[i] = place.material.effective_opacity(o);
@@ -296,22 +302,33 @@ impl Body {
         match (&*self.geometry, &*self.shape) {
             (Geometry::Form(_), Shape::Primitive(primitive)) => {
                 let uv = Some(primitive.uv(local, normal.normalize_or_zero()));
-                Place { normal, uv, material }
+                Place { normal, uv, material, color: None }
             }
             (Geometry::Plane { width, depth }, _) => {
                 let plane = Primitive::Plane { width: *width, depth: *depth };
-                Place { normal: DVec3::Y, uv: Some(plane.uv(local, DVec3::Y)), material }
+                Place { normal: DVec3::Y, uv: Some(plane.uv(local, DVec3::Y)), material, color: None }
             }
             (Geometry::Heights(_), Shape::HeightField(heights)) => {
                 let uv = Some(heights.uv(local.x, local.z));
-                Place { normal: heights.height_and_normal(local.x, local.z).1, uv, material }
+                Place { normal: heights.height_and_normal(local.x, local.z).1, uv, material, color: None }
             }
             (Geometry::Field(model), _) => {
                 let material =
                     model.palette.get(field::material(model, local)).unwrap_or(Material::fallback());
-                Place { normal: field::normal(model, local, direction), uv: None, material }
+                Place { normal: field::normal(model, local, direction), uv: None, material, color: None }
             }
-            _ => Place { normal, uv: None, material },
+            (Geometry::Volume(body), Shape::Volume(volume)) => {
+                // On the cut of a shell the field is higher than at the surface.
+                let value = (volume.value(local) as f32).max(body.surface.unwrap_or_default());
+                let normal = match &volume.shell {
+                    Some(shell) if shell.form().value(local).abs() < 1e-3 * shell.bounds().radius() => {
+                        -shell.form().value_and_gradient(local).1
+                    }
+                    _ => -volume.gradient(local),
+                };
+                Place { normal, uv: None, material, color: Some(volume.transfer.at(value).0) }
+            }
+            _ => Place { normal, uv: None, material, color: None },
         }
     }
 }
@@ -321,4 +338,6 @@ struct Place<'a> {
     normal: DVec3,
     uv: Option<[f32; 2]>,
     material: &'a Material,
+    /// In place of the material's.
+    color: Option<Vec3>,
 }

@@ -3,6 +3,7 @@
 use super::schema_views::{CameraEntry, LightEntry, LightKindEntry, ProjectionEntry, Scale, TransformEntry};
 use crate::camera::{Camera, Projection};
 use crate::load::error::Fault;
+use crate::projector::Projector;
 use crate::scene::{Light, LightKind};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -156,6 +157,18 @@ pub(super) fn camera(entry: &CameraEntry) -> Result<Camera, Fault> {
             fov_x: angle("fov_x_deg", fov_x_deg, 360.0)?,
             fov_y: angle("fov_y_deg", fov_y_deg, 179.0)?,
         },
+        ProjectionEntry::Projector { at, toward, fov_y_deg, aspect, screen } => {
+            let fov_y = angle("fov_y_deg", fov_y_deg, 179.0)?;
+            if !(0.01..=100.0).contains(&aspect) {
+                return Err(usage(format!("`aspect` is {aspect}"), "give a number from 0.01 to 100"));
+            }
+            let [at, toward] = [at, toward].map(DVec3::from_array);
+            let lens = Camera::look_at(at, toward, up, Projection::Perspective { fov_y });
+            // A table as fine as for a picture of that height.
+            return Projector { lens, screen }
+                .camera(eye, (aspect * 1080.0) as u32, 1080)
+                .map_err(|e| usage(e, "give finite places and a radius above 0"));
+        }
     };
     Ok(Camera::look_at(eye, target, up, projection))
 }
