@@ -73,7 +73,7 @@ fn info() -> BackendInfo {
                 unit: "",
                 help: "whether volumes of which many samples are in a pixel are drawn from averages of samples",
                 tag: "volume.levels",
-                quality_axis: true,
+                quality_axis: false,
             },
             Parameter {
                 name: "volume.surface",
@@ -100,7 +100,7 @@ fn info() -> BackendInfo {
                 unit: "rays",
                 help: "rays along each edge of a pixel in which edges or thin things may be",
                 tag: "edge.rays",
-                quality_axis: true,
+                quality_axis: false,
             },
             Parameter {
                 name: "shadow",

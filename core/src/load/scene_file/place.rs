@@ -203,6 +203,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_projector_is_a_camera_of_its_viewer() {
+        let text = r##"(name: "dome", eye: (1, 0, 0.5), target: (1, 0, -4), projection: Projector(at: (0, 0, 2),
+            toward: (0, 1, -5), fov_y_deg: 70, aspect: 1.6, screen: Dome(center: (0, 0, 0), radius: 5)))"##;
+        let entry: CameraEntry = ron::from_str(text).unwrap();
+        let built = camera(&entry).unwrap();
+        assert_eq!(built.eye, DVec3::new(1.0, 0.0, 0.5));
+        // What is thrown upon the middle of the picture lies behind where the lens looks.
+        let lens = (DVec3::new(0.0, 1.0, -5.0) - DVec3::new(0.0, 0.0, 2.0)).normalize_or_zero();
+        let ray = built.view(1728, 1080).ray(864.0, 540.0).unwrap();
+        let on_dome = (0..9000).map(|i| DVec3::new(0.0, 0.0, 2.0) + lens * f64::from(i) * 1e-3);
+        let point =
+            on_dome.min_by(|a, b| (a.length() - 5.0).abs().total_cmp(&(b.length() - 5.0).abs())).unwrap();
+        assert!(ray.direction.angle_between(point - built.eye) < 2e-3, "{}", ray.direction);
+        let ProjectionEntry::Projector { at, toward, fov_y_deg, screen, .. } = entry.projection else {
+            panic!()
+        };
+        for aspect in [0.0, f64::NAN] {
+            let projection = ProjectionEntry::Projector { at, toward, fov_y_deg, aspect, screen };
+            assert!(camera(&CameraEntry { projection, ..entry.clone() }).is_err());
+        }
+    }
+
+    #[test]
     fn angles_turn_around_x_then_y_then_z() {
         let entry = TransformEntry {
             translate: Some([1.0, 0.0, 0.0]),
