@@ -168,6 +168,13 @@ impl F32x8 {
         I32x8(lanes!(0, i => (self.0[i] + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32))
     }
 
+    /// Rounds numbers less than 2^22 from zero down to whole ones.
+    #[must_use]
+    #[inline(always)]
+    pub fn nearest_below(self) -> I32x8 {
+        F32x8(lanes!(0.0, i => self.0[i].floor())).nearest()
+    }
+
     /// Puts zero in place of what is not finite.
     #[must_use]
     #[inline(always)]
@@ -610,6 +617,7 @@ mod tests {
         assert_eq!(halves.nearest().0, [0, 0, 2, 2, -3, 1_000_000_000, -1_000_000_000, 0]);
         let single = F32x8([0.5, -0.5, 1.5, 2.4, -2.6, 4e6, -4e6, 0.0]);
         assert_eq!(single.nearest().0, [0, 0, 2, 2, -3, 4_000_000, -4_000_000, 0]);
+        assert_eq!(single.nearest_below().0, [0, -1, 1, 2, -3, 4_000_000, -4_000_000, 0]);
         let (low, high) = (I32x8::splat(-3), I32x8::count_from(-5));
         assert_eq!(high.max(low).min(I32x8::splat(0)).0, [-3, -3, -3, -2, -1, 0, 0, 0]);
         assert_eq!(I32x8::pick(high.below(low) | high.equal(low), low, high), high.max(low));

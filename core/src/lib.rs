@@ -18,6 +18,7 @@ pub mod math;
 pub mod metrics;
 pub mod parallel;
 pub mod pixels;
+pub mod projector;
 pub mod scene;
 pub mod seam;
 pub mod shade;

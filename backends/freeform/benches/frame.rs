@@ -247,17 +247,24 @@ fn head() -> Volume {
 }
 
 /// A head from tomography, lit: bone alone, or skin and muscle too, with steps in units of the spacing.
-#[divan::bench(args = ["bone 0.5", "bone 1.0", "tissue 0.5", "tissue 1.0"], consts = [1, 2])]
+#[divan::bench(args = ["bone 0.5", "bone 1.0", "tissue 0.5", "tissue 1.0", "tissue 1.0 kept", "skin 1.0"], consts = [1, 2])]
 fn tomography<const THREADS: usize>(bencher: Bencher, which: &str) {
     let mut volume = head();
-    let (preset, step) = which.split_once(' ').expect("two words");
-    let preset = if preset == "bone" { TransferPreset::CtBone } else { TransferPreset::CtTissue };
+    let mut words = which.split(' ');
+    let preset = match words.next() {
+        Some("bone") => TransferPreset::CtBone,
+        Some("skin") => TransferPreset::CtSkin,
+        _ => TransferPreset::CtTissue,
+    };
+    let settings = [
+        ("volume.step", words.next().unwrap_or("0.5")),
+        ("volume.gradients", words.next().unwrap_or("found")),
+    ];
     volume.transfer = TransferFunction::preset(preset, volume.spacing().min_element());
     let far = volume.bounds().radius() * 2.6;
     let camera = look(DVec3::new(0.45, -0.85, 0.3).normalize_or_zero() * far, DVec3::ZERO, 0.7);
     let scene = scene_of(Shape::Volume(volume));
-    let mut stage =
-        Stage::with(scene, camera, [1280, 720], Channels::COLOR, THREADS, &[("volume.step", step)]);
+    let mut stage = Stage::with(scene, camera, [1280, 720], Channels::COLOR, THREADS, &settings);
     bencher.bench_local(|| stage.render());
 }
 

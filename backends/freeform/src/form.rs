@@ -7,6 +7,7 @@
 
 use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::program::{Active, Program, Step, values_and_gradients};
+use crate::pyramid::Pyramid;
 use crate::roots::{RayQuadric, Stack, first_roots};
 use glam::{DAffine3, DVec3, Vec3};
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, Mask8, Vec3x8};
@@ -14,14 +15,11 @@ use polyptych_core::math::Aabb;
 use polyptych_core::scene::{FreeForm, Quadric};
 
 /// How often a stretch is halved at most.
-const LEVELS: usize = 6;
+pub(crate) const LEVELS: usize = 6;
 
 /// By how much of their length the halves of a stretch overlap, so that a root on the border, which rounding may
 /// put on either side, is inside of one.
 const OVERLAP: f64 = 1e-4;
-
-/// A stretch is halved while it is so much longer than the tile is wide.
-const SLENDER: f64 = 3.0;
 
 /// In which numbers roots are searched for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,16 +34,16 @@ pub(crate) enum Precision {
 /// A free form, ready to be cast.
 #[derive(Debug)]
 pub(crate) struct FormBody {
-    program: Program,
+    pub(crate) program: Program,
     /// The form's bounds with a margin, so that rays enter it from outside of the solid.
-    bounds: Aabb,
+    pub(crate) bounds: Aabb,
 }
 
 /// Scratch memory of one worker.
 #[derive(Default)]
 pub(crate) struct FormScratch {
     /// What matters at each level of halving.
-    active: [Active; LEVELS],
+    pub(crate) active: [Active; LEVELS],
     /// The quadrics around the middle of a part.
     near: Vec<NearQuadric>,
     /// What matters to eight rays, and the quadrics along them.
@@ -133,12 +131,6 @@ impl NearQuadric {
         let error = ((a.abs() * reach + b.abs()) * reach + c.abs()) * rounding + F32x8::splat(self.slack);
         RayQuadric { a, b, c, error }
     }
-}
-
-/// Bounds of all rays of a tile.
-pub(crate) struct Pyramid {
-    origins: Aabb,
-    directions: Aabb,
 }
 
 /// What rays are cast for: the body whose hits they improve, and which roots count.
@@ -440,83 +432,6 @@ fn clip_near(half: Vec3, offset: Vec3x8, toward: Vec3x8) -> (F32x8, F32x8) {
     (near, far)
 }
 
-/// Returns where rays enter and leave a box, as [`Aabb::clip`]; rays in a face plane are inside.
-#[inline(always)]
-pub(crate) fn clip(bounds: &Aabb, origin: &DVec3x8, direction: &DVec3x8) -> (F64x8, F64x8) {
-    let infinity = F64x8::splat(f64::INFINITY);
-    let (mut near, mut far) = (F64x8::ZERO, infinity);
-    let axes = [
-        (origin.x, direction.x, bounds.min.x, bounds.max.x),
-        (origin.y, direction.y, bounds.min.y, bounds.max.y),
-        (origin.z, direction.z, bounds.min.z, bounds.max.z),
-    ];
-    for (o, d, min, max) in axes {
-        let (min, max) = (F64x8::splat(min) - o, F64x8::splat(max) - o);
-        let (a, b) = (min / d, max / d);
-        let flat = d.equal(F64x8::ZERO);
-        let outside = flat & (min.above(F64x8::ZERO) | F64x8::ZERO.above(max));
-        let (low, high) = (a.min(b), a.max(b));
-        near = F64x8::pick(flat, near, near.max(low));
-        far = F64x8::pick(outside, -infinity, F64x8::pick(flat, far, far.min(high)));
-    }
-    (near, far)
-}
-
-impl Pyramid {
-    /// Bounds rays of which some are open, with the range of their distances; nothing if there are none.
-    #[inline(always)]
-    pub(crate) fn around(
-        rays: impl Iterator<Item = (Mask8, DVec3x8, DVec3x8, F64x8, F64x8)>,
-    ) -> Option<(Self, f64, f64)> {
-        let (top, bottom) = (F64x8::splat(f64::INFINITY), F64x8::splat(f64::NEG_INFINITY));
-        let (mut low, mut high) = ([top; 7], [bottom; 7]);
-        for (open, o, d, near, far) in rays {
-            let numbers = [o.x, o.y, o.z, d.x, d.y, d.z];
-            if (!open).any() {
-                for i in 0..6 {
-                    low[i] = low[i].min(F64x8::pick(open, numbers[i], top));
-                    high[i] = high[i].max(F64x8::pick(open, numbers[i], bottom));
-                }
-                low[6] = low[6].min(F64x8::pick(open, near, top));
-                high[6] = high[6].max(F64x8::pick(open, far, bottom));
-            } else {
-                for i in 0..6 {
-                    low[i] = low[i].min(numbers[i]);
-                    high[i] = high[i].max(numbers[i]);
-                }
-                low[6] = low[6].min(near);
-                high[6] = high[6].max(far);
-            }
-        }
-        let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
-        let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));
-        let boxed = |i: usize| {
-            let [from, to] = [&low, &high].map(|v| DVec3::new(v[i], v[i + 1], v[i + 2]));
-            Aabb::new(from, to)
-        };
-        (low[6] <= high[6]).then(|| (Self { origins: boxed(0), directions: boxed(3) }, low[6], high[6]))
-    }
-
-    /// Returns how wide all rays together are at a distance.
-    #[inline(always)]
-    pub(crate) fn width(&self, t: f64) -> f64 {
-        (self.origins.size() + self.directions.size() * t).max_element()
-    }
-
-    /// Bounds the places of all rays between two distances.
-    #[inline(always)]
-    pub(crate) fn between(&self, a: f64, b: f64) -> Aabb {
-        let (d, o) = (&self.directions, &self.origins);
-        let (low, high) = ((d.min * a).min(d.min * b), (d.max * a).max(d.max * b));
-        Aabb::new(o.min + low, o.max + high)
-    }
-
-    /// Tells whether the rays between two distances are much longer than all of them together are wide.
-    fn is_slender(&self, a: f64, b: f64) -> bool {
-        self.directions.center().length() * (b - a) > SLENDER * self.width(b)
-    }
-}
-
 /// Eight rays around points on them.
 struct Line {
     point: DVec3x8,
@@ -696,7 +611,7 @@ pub(crate) mod tests {
             origin.set(i, o);
             direction.set(i, d);
         }
-        let (near, far) = clip(&bounds, &origin, &direction);
+        let (near, far) = crate::pyramid::clip(&bounds, &origin, &direction);
         for (i, &(o, d)) in rays.iter().enumerate() {
             let many = (near.0[i] <= far.0[i]).then_some((near.0[i], far.0[i]));
             assert_eq!(many, bounds.clip(o, d), "{i}");

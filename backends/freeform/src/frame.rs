@@ -1,57 +1,36 @@
 //! A picture, tile by tile: what is met first, then what is seen through, then the light on it.
 
 use crate::bundle::{COLUMNS, Cone, Crossing, Hits, OCTETS, Rays, Sides, TILE};
+use crate::edges::Fine;
+use crate::layers;
 use crate::light::{Illumination, Lit};
-use crate::volume::{Gathered, March, OPAQUE};
-use crate::world::{Body, CastScratch, Geometry, World};
-use glam::{DVec3, Vec3};
+use crate::march::Gathered;
+use crate::world::{Body, CastScratch, World};
+use glam::Vec3;
 use polyptych_core::camera::View;
 use polyptych_core::framebuffer::{Band, Channel, Channels};
 use polyptych_core::lanes::{F32x8, F64x8, LANES, Mask8, Vec3x8};
-use polyptych_core::scene::Shape;
 use polyptych_core::seam::Control;
-use polyptych_core::shade::{facing, fogged};
+use polyptych_core::shade::fogged;
 
 /// Scratch memory for one band.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    rays: Vec<Rays>,
-    opaque: Vec<Hits>,
+    pub(crate) rays: Vec<Rays>,
+    pub(crate) opaque: Vec<Hits>,
     /// Rays that are followed through see-through surfaces, and what they met last.
-    through: Vec<Rays>,
-    layer: Vec<Hits>,
-    gathered: Vec<[Gathered; LANES]>,
-    pixels: Vec<Pixels>,
+    pub(crate) through: Vec<Rays>,
+    pub(crate) layer: Vec<Hits>,
+    pub(crate) gathered: Vec<Gathered>,
+    pub(crate) pixels: Vec<Pixels>,
     /// Bodies that the rays of the tile may meet.
-    bodies: Vec<u32>,
-    light: crate::light::Scratch,
-    form: CastScratch,
-    /// Parts of one ray in volumes.
-    stretches: Vec<Stretch>,
+    pub(crate) bodies: Vec<u32>,
+    pub(crate) light: crate::light::Scratch,
+    pub(crate) form: CastScratch,
+    /// Parts of rays in volumes.
+    pub(crate) inside: layers::Scratch,
+    pub(crate) fine: Fine,
     pub(crate) traced: u64,
-}
-
-/// The part of a ray in one volume.
-struct Stretch {
-    body: u32,
-    /// The ray in object space.
-    origin: DVec3,
-    direction: DVec3,
-    /// Where it enters the volume; samples are counted from there.
-    enter: f64,
-    step: f64,
-    /// Those that are left.
-    samples: std::ops::Range<u32>,
-}
-
-impl Stretch {
-    fn begin(&self) -> f64 {
-        self.enter + f64::from(self.samples.start) * self.step
-    }
-
-    fn end(&self) -> f64 {
-        self.enter + f64::from(self.samples.end) * self.step
-    }
 }
 
 /// What one frame is drawn with.
@@ -59,32 +38,48 @@ pub(crate) struct FrameDrawing<'a> {
     pub(crate) world: &'a World,
     pub(crate) view: View<'a>,
     pub(crate) channels: Channels,
+    /// Where in the view the first pixel of a band that begins at row 0 is.
+    pub(crate) corner: [u32; 2],
 }
 
 impl FrameDrawing<'_> {
+    /// Draws all tiles of a band.
+    pub(crate) fn draw(&self, band: &mut Band<'_>, scratch: &mut Scratch) {
+        let mut lit = [Lit::NOTHING; OCTETS];
+        for first in (0..band.width).step_by(TILE as usize) {
+            self.draw_tile(band, first, &mut lit, scratch);
+        }
+    }
+
     /// Draws a band, tile by tile; stops between tiles when the host wants to.
-    pub(crate) fn band(&self, mut band: Band<'_>, scratch: &mut Scratch, control: &Control<'_>) {
+    pub(crate) fn band(&self, band: &mut Band<'_>, scratch: &mut Scratch, control: &Control<'_>) {
         scratch.traced = 0;
         let mut lit = [Lit::NOTHING; OCTETS];
         for first in (0..band.width).step_by(TILE as usize) {
             if control.is_cancelled() {
                 return;
             }
-            #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
-                #[expect(
-                    unsafe_code,
-                    reason = "a kernel compiled for a processor feature can only be called so"
-                )]
-                // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-                unsafe {
-                    self.tile_avx2(&mut band, first, &mut lit, scratch);
-                }
-                continue;
-            }
-            self.tile(&mut band, first, &mut lit, scratch);
+            self.draw_tile(band, first, &mut lit, scratch);
         }
-        control.finished(&band);
+    }
+
+    fn draw_tile<'a>(
+        &'a self,
+        band: &mut Band<'_>,
+        first: u32,
+        lit: &mut [Lit<'a>; OCTETS],
+        scratch: &mut Scratch,
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[expect(
+                unsafe_code,
+                reason = "a kernel compiled for a processor feature can only be called so"
+            )]
+            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
+            return unsafe { self.tile_avx2(band, first, lit, scratch) };
+        }
+        self.tile(band, first, lit, scratch);
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -108,7 +103,7 @@ impl FrameDrawing<'_> {
         scratch: &mut Scratch,
     ) {
         // Where straight lines stay straight the corners bound all rays, which need not be known.
-        let straight = self.view.row(band.first_row).is_some();
+        let straight = self.view.row(band.first_row + self.corner[1]).is_some();
         let (cone, sides) = if straight {
             let corners = self.corners(band, first);
             let around = [1, 0, 2, 3].map(|i| (corners.origin.get(i), corners.direction.get(i)));
@@ -158,7 +153,7 @@ impl FrameDrawing<'_> {
         scratch.pixels.resize(OCTETS, Pixels::NOTHING);
         if through {
             scratch.gathered.clear();
-            scratch.gathered.resize(OCTETS, [Gathered::NOTHING; LANES]);
+            scratch.gathered.resize(OCTETS, Gathered::NOTHING);
             self.look_through(layered, volumes, lit, scratch);
         }
         self.finish((first, band.first_row), through, lit, scratch);
@@ -173,9 +168,10 @@ impl FrameDrawing<'_> {
     /// Returns the rays through the corners of a tile of a view that keeps straight lines straight.
     #[inline(always)]
     fn corners(&self, band: &Band<'_>, first: u32) -> Rays {
-        let mut x = F64x8::splat(f64::from(first));
-        (0..LANES).step_by(2).for_each(|i| x.0[i] = f64::from(band.width.min(first + TILE)));
-        let row = f64::from(band.first_row);
+        let [left, top] = self.corner;
+        let mut x = F64x8::splat(f64::from(left + first));
+        (0..LANES).step_by(2).for_each(|i| x.0[i] = f64::from(left + band.width.min(first + TILE)));
+        let row = f64::from(top + band.first_row);
         let (mut origin, mut direction, _) = self.view.rays(x, row);
         let lower = self.view.rays(x, row + f64::from(band.rows));
         for i in 0..2 {
@@ -195,10 +191,11 @@ impl FrameDrawing<'_> {
                 Pixels::NOTHING.put(band, column, row);
             }
             let begin = (row * band.width + first) as usize;
+            let directions = self.view.row(self.corner[1] + band.first_row + row);
             if let (Some(colors), Some(directions)) =
-                (band.color.get_mut(begin..begin + columns as usize), self.view.row(band.first_row + row))
+                (band.color.get_mut(begin..begin + columns as usize), directions)
             {
-                directions.fill(&self.world.scene.environment.background, first, colors);
+                directions.fill(&self.world.scene.environment.background, self.corner[0] + first, colors);
             }
         }
     }
@@ -207,11 +204,11 @@ impl FrameDrawing<'_> {
     #[inline(always)]
     fn background(&self, column: u32, row: u32, rays: &Rays) -> Vec3x8 {
         let background = &self.world.scene.environment.background;
-        let Some(directions) = self.view.row(row) else {
+        let Some(directions) = self.view.row(self.corner[1] + row) else {
             return background.gradient().colors(rays.direction.y.round()).finite();
         };
         let mut colors = [Vec3::ZERO; LANES];
-        directions.fill(background, column, &mut colors);
+        directions.fill(background, self.corner[0] + column, &mut colors);
         let mut all = Pixels::BLACK;
         for (lane, color) in colors.into_iter().enumerate() {
             all.set(lane, color);
@@ -226,8 +223,9 @@ impl FrameDrawing<'_> {
         for octet in 0..OCTETS {
             let (row, column) = ((octet / COLUMNS) as u32, first + (octet % COLUMNS * LANES) as u32);
             let mut x = F64x8::ZERO;
-            (0..LANES).for_each(|i| x.0[i] = f64::from(column + i as u32) + 0.5);
-            let (origin, direction, there) = self.view.rays(x, f64::from(band.first_row + row) + 0.5);
+            (0..LANES).for_each(|i| x.0[i] = f64::from(self.corner[0] + column + i as u32) + 0.5);
+            let y = f64::from(self.corner[1] + band.first_row + row) + 0.5;
+            let (origin, direction, there) = self.view.rays(x, y);
             let left = band.width.saturating_sub(column) as usize;
             let there = there & Mask8::first(if row < band.rows { left } else { 0 });
             let far = F64x8::pick(there, F64x8::splat(f64::INFINITY), F64x8::splat(-1.0));
@@ -238,7 +236,7 @@ impl FrameDrawing<'_> {
 
     /// Finds what each ray meets first among some bodies, or nothing nearer than before.
     #[inline(always)]
-    fn nearest(
+    pub(crate) fn nearest(
         &self,
         wanted: impl Fn(&Body) -> bool,
         bodies: &[u32],
@@ -275,166 +273,10 @@ impl FrameDrawing<'_> {
         });
     }
 
-    fn illumination(&self) -> Illumination<'_> {
+    pub(crate) fn illumination(&self) -> Illumination<'_> {
         let wanted = self.channels.has(Channel::Color) || self.channels.has(Channel::Shadow);
         let reads_color = self.channels.has(Channel::Color) || self.channels.has(Channel::Albedo);
         Illumination { world: self.world, wanted, reads_color }
-    }
-
-    /// Gathers see-through surfaces and volumes in front of the opaque ones, layer by layer.
-    fn look_through<'a>(
-        &'a self,
-        layered: bool,
-        volumes: bool,
-        lit: &mut [Lit<'a>; OCTETS],
-        scratch: &mut Scratch,
-    ) {
-        scratch.through.clear();
-        scratch.through.extend(
-            scratch.rays.iter().zip(&scratch.opaque).map(|(rays, hits)| Rays { far: hits.t, ..*rays }),
-        );
-        loop {
-            let Scratch { layer, through, form, bodies, .. } = &mut *scratch;
-            layer.clear();
-            layer.extend(through.iter().map(Hits::nothing));
-            if layered {
-                self.nearest(|b| b.see_through && !b.is_volume(), bodies, through, layer, form);
-            }
-            if volumes {
-                self.march_volumes(scratch);
-            }
-            if !scratch.layer.iter().any(|hits| hits.any().any()) {
-                return;
-            }
-            let Scratch { layer, rays, light, form, traced, .. } = &mut *scratch;
-            self.illumination().light(rays, layer, lit, (light, form), traced);
-            for (octet, lit) in lit.iter().enumerate() {
-                let (hits, met) = (scratch.layer[octet], scratch.layer[octet].any());
-                let rays = &mut scratch.through[octet];
-                for i in 0..LANES {
-                    if !met.has(i) {
-                        rays.close(i);
-                        continue;
-                    }
-                    let body = &self.world.bodies[hits.body.0[i] as usize];
-                    let gathered = &mut scratch.gathered[octet][i];
-                    let opacity = lit.points.opacity.0[i];
-                    if opacity > 0.0 {
-                        if gathered.half.is_none() {
-                            let mut mask = Mask8::NONE;
-                            mask.0[i] = u32::MAX;
-                            self.first_surface(&mut scratch.pixels[octet], lit, &hits, mask);
-                        }
-                        gathered.add(self.seen(lit.color.get(i), hits.t.0[i]), opacity);
-                    }
-                    // The same surface again begins a hair behind: the resolution of single precision.
-                    rays.near.0[i] = hits.t.0[i] + body.radius * 2e-5;
-                    if gathered.transparency < OPAQUE {
-                        rays.close(i);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Adds the volumes between the last layer and this one, all of them together in the order of depth.
-    fn march_volumes(&self, scratch: &mut Scratch) {
-        for octet in 0..OCTETS {
-            let open = scratch.through[octet].open();
-            for lane in (0..LANES).filter(|&i| open.has(i)) {
-                let end = scratch.layer[octet].t.0[lane];
-                if scratch.through[octet].near.0[lane] < end
-                    && scratch.gathered[octet][lane].transparency >= OPAQUE
-                {
-                    self.march(octet, lane, end, scratch);
-                }
-            }
-        }
-    }
-
-    /// Adds all volumes along one ray.
-    fn march(&self, octet: usize, lane: usize, end: f64, scratch: &mut Scratch) {
-        let rays = &scratch.through[octet];
-        let (eye, toward, near) = (rays.origin.get(lane), rays.direction.get(lane), rays.near.0[lane]);
-        scratch.stretches.clear();
-        for &index in &scratch.bodies {
-            let body = &self.world.bodies[index as usize];
-            let Geometry::Volume(volume) = &*body.geometry else { continue };
-            let origin = body.object_from_world.transform_point3(eye);
-            let direction = body.object_from_world.transform_vector3(toward);
-            let Some((enter, leave)) = body.local_bounds.clip(origin, direction) else { continue };
-            let step = volume.step / direction.length();
-            // Samples keep their places whatever layers cut the ray: each belongs to the part it stands in.
-            let count = ((leave.min(end) - enter) / step - 0.5).ceil().clamp(0.0, f64::from(u32::MAX / 4));
-            let first = ((near - enter) / step - 0.5).ceil().clamp(0.0, count) as u32;
-            if first < count as u32 {
-                let samples = first..count as u32;
-                scratch.stretches.push(Stretch { body: index, origin, direction, enter, step, samples });
-            }
-        }
-        let stretches = &mut scratch.stretches;
-        stretches.sort_unstable_by(|a, b| a.begin().total_cmp(&b.begin()).then(a.body.cmp(&b.body)));
-        let sum = &mut scratch.gathered[octet][lane];
-        let pixels = &mut scratch.pixels[octet];
-        // Where volumes overlap they take turns, slice by slice, as thick as the longest of their steps.
-        while let Some(first) = stretches.first() {
-            let begin = first.begin();
-            let over = |s: &Stretch| s.begin() < first.end();
-            let together = stretches.iter().take_while(|s| over(s)).count();
-            let slice = stretches[..together].iter().map(|s| s.step).fold(0.0, f64::max);
-            let until = if together == 1 { f64::INFINITY } else { begin + slice };
-            for stretch in &mut stretches[..together] {
-                self.march_stretch(stretch, until, toward, sum, (pixels, lane));
-            }
-            stretches.retain(|s| !s.samples.is_empty() && sum.transparency >= OPAQUE);
-            stretches.sort_unstable_by(|a, b| a.begin().total_cmp(&b.begin()).then(a.body.cmp(&b.body)));
-        }
-    }
-
-    /// Adds the samples of a volume up to a distance.
-    fn march_stretch(
-        &self,
-        stretch: &mut Stretch,
-        until: f64,
-        toward: DVec3,
-        sum: &mut Gathered,
-        (pixels, lane): (&mut Pixels, usize),
-    ) {
-        let body = &self.world.bodies[stretch.body as usize];
-        let (Geometry::Volume(volume), Shape::Volume(shape)) = (&*body.geometry, &*body.shape) else {
-            return;
-        };
-        let count = ((until - stretch.enter) / stretch.step - 0.5).ceil();
-        let last = (count.clamp(0.0, f64::from(u32::MAX / 2)) as u32)
-            .clamp(stretch.samples.start, stretch.samples.end);
-        let scene = &self.world.scene;
-        let march = March {
-            volume: shape,
-            material: scene.material(&scene.objects[body.object], 0),
-            environment: &scene.environment,
-            shines: &body.shines,
-            origin: stretch.origin,
-            direction: stretch.direction,
-            step: stretch.step,
-            normal_map: body.normal_map.as_mat3(),
-            to_eye: -toward.as_vec3(),
-        };
-        let was_half = sum.half;
-        volume.march(&march, stretch.enter, stretch.samples.start..last, sum);
-        stretch.samples.start = last;
-        if let (None, Some(t)) = (was_half, sum.half)
-            && pixels.id.0[lane] == 0
-        {
-            (pixels.id.0[lane], pixels.distance.0[lane]) = (body.object as u32 + 1, t as f32);
-            let p = stretch.origin + stretch.direction * t;
-            if self.channels.has(Channel::Normal) {
-                let normal = body.normal_map * -shape.gradient(p);
-                pixels.normal.set(lane, facing(normal.normalize_or(-toward), toward).as_vec3());
-            }
-            if self.channels.has(Channel::Albedo) {
-                pixels.albedo.set(lane, shape.transfer.at(shape.value(p) as f32).0);
-            }
-        }
     }
 
     /// Lights the opaque surfaces, lays what was gathered over them, and fills the pixels.
@@ -467,22 +309,21 @@ impl FrameDrawing<'_> {
                 }
                 pixels.color = Vec3x8::pick(met, seen, pixels.color);
             }
-            for i in (0..LANES).filter(|_| through) {
-                let gathered = &mut scratch.gathered[octet][i];
-                gathered.add(pixels.color.get(i), 1.0);
-                pixels.color.set(i, gathered.color);
+            if through {
+                let gathered = &scratch.gathered[octet];
+                pixels.color = gathered.color + pixels.color.scaled(gathered.transparency);
             }
         }
     }
 
     #[inline(always)]
-    fn seen(&self, color: Vec3, t: f64) -> Vec3 {
+    pub(crate) fn seen(&self, color: Vec3, t: f64) -> Vec3 {
         fogged(&self.world.scene.environment, color, t)
     }
 
     /// Fills the geometry channels of pixels that show nothing yet.
     #[inline(always)]
-    fn first_surface(&self, pixels: &mut Pixels, lit: &Lit<'_>, hits: &Hits, met: Mask8) {
+    pub(crate) fn first_surface(&self, pixels: &mut Pixels, lit: &Lit<'_>, hits: &Hits, met: Mask8) {
         let (mut free, mut ids) = (met, Mask8::NONE);
         for i in 0..LANES {
             free.0[i] &= if pixels.id.0[i] == 0 { u32::MAX } else { 0 };
@@ -504,13 +345,13 @@ impl FrameDrawing<'_> {
 
 /// Eight pixels.
 #[derive(Clone, Copy)]
-struct Pixels {
+pub(crate) struct Pixels {
     color: Vec3x8,
-    distance: F32x8,
-    normal: Vec3x8,
+    pub(crate) distance: F32x8,
+    pub(crate) normal: Vec3x8,
     /// 0 where there is nothing.
-    id: Mask8,
-    albedo: Vec3x8,
+    pub(crate) id: Mask8,
+    pub(crate) albedo: Vec3x8,
     shadow: F32x8,
 }
 

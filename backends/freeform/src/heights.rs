@@ -8,7 +8,7 @@
 //! rendering*, I3D 2008.
 
 use crate::bundle::{COLUMNS, Hits, OCTETS, Rays};
-use crate::form::{Pyramid, clip};
+use crate::pyramid::{Pyramid, clip};
 use glam::{DAffine3, DVec2, DVec3};
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 use polyptych_core::math::Aabb;

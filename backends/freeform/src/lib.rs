@@ -12,24 +12,31 @@
 //!   the rays as they are, not by a projective form of the space: set up at the middle of each part they are as exact
 //!   for a far eye as for a near one.
 //! - Height fields are walked from where the rays of a tile, and then of its blocks, come near them.
-//! - Volumes: what is transparent is jumped without a change of the picture; where volumes overlap, their samples are
-//!   taken in the order of depth.
-//! - One sample a pixel, through its middle; mirrors are drawn as if they were not (and the report says so).
+//! - Volumes: eight rays look for samples that add light, and those that found one are lit together; what is transparent
+//!   is jumped without a change of the picture. In a shell samples begin where a ray enters it. Where volumes overlap,
+//!   their samples are taken in the order of depth. Gradients are found for each sample or kept (`volume.gradients`),
+//!   coarser samples are there by choice (`volume.levels`), and so is the surface alone (`volume.surface`).
+//! - One sample a pixel, through its middle, or where edges or thin things may be as many as asked (`edge.rays`); mirrors are drawn as if they were not (and the report says so).
 //!
 //! Source: S. I. Vyatkin, *Complex surface modeling using perturbation functions*, Optoelectronics,
 //! Instrumentation and Data Processing 43(3), 2007; we subdivide screen tiles in depth, in perspective as it is,
 //! instead of a projected space.
 
 mod bundle;
+mod edges;
 mod field;
 mod form;
 mod frame;
 mod heights;
+mod layers;
 mod light;
+mod march;
 mod plan;
 mod program;
+mod pyramid;
 mod renderer;
 mod roots;
+mod surface;
 #[cfg(test)]
 mod truth;
 mod volume;

@@ -1,6 +1,7 @@
 //! What would be built for a need, and what would that cost?
 
-use crate::renderer::{converted, with_material};
+use crate::renderer::{converted, unconverted, with_material};
+use crate::volume::Drawing;
 use crate::world::Geometry;
 use polyptych_core::convert::{Converter, Detail};
 use polyptych_core::scene::{Object, Scene, Shape};
@@ -33,7 +34,7 @@ pub(crate) fn plan(
     scene: &Scene,
     need: &Need,
     demand: &Demand,
-    volume_step: f64,
+    volumes: Drawing,
     detail: impl Fn(&Object) -> Detail,
 ) -> Plan {
     let converter = Converter::default();
@@ -46,7 +47,7 @@ pub(crate) fn plan(
         .zip(&mut edges)
         .map(|(object, edge)| {
             let is_new = known.insert(Arc::as_ptr(&object.shape));
-            plan_object(scene, object, &converter, detail(object), is_new, edge)
+            plan_object(scene, object, &converter, detail(object), volumes, (is_new, edge))
         })
         .collect();
     let mut passes =
@@ -56,7 +57,7 @@ pub(crate) fn plan(
     Plan {
         bytes: objects.iter().map(|o| o.bytes).sum(),
         passes,
-        estimated_ms: milliseconds(scene, need, demand, volume_step, &edges),
+        estimated_ms: milliseconds(scene, need, demand, volumes.step, &edges),
         objects,
     }
 }
@@ -66,8 +67,8 @@ fn plan_object(
     object: &Object,
     converter: &Converter,
     detail: Detail,
-    is_new: bool,
-    edge: &mut f64,
+    volumes: Drawing,
+    (is_new, edge): (bool, &mut f64),
 ) -> ObjectPlan {
     let (decision, builds, bytes) = match (seam::why_not_drawn(object), &*object.shape) {
         (Some(why), _) => (Decision::Skipped { why: why.to_owned() }, String::new(), 0),
@@ -84,8 +85,8 @@ fn plan_object(
             (with_material(scene, object, decision), forecast.builds, forecast.bytes)
         }
         (None, shape) => {
-            let bytes = Geometry::planned_bytes(shape);
-            (with_material(scene, object, Decision::Exact), String::new(), bytes)
+            let bytes = Geometry::planned_bytes(shape, volumes);
+            (with_material(scene, object, unconverted(shape, volumes)), String::new(), bytes)
         }
     };
     let bytes = if is_new { bytes } else { 0 };

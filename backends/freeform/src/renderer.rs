@@ -1,9 +1,11 @@
 //! The seam: what is prepared and kept, and one frame of it.
 
 use crate::bundle::TILE;
+use crate::edges::Edges;
 use crate::form::Precision;
 use crate::frame::{FrameDrawing, Scratch};
 use crate::plan::plan;
+use crate::volume::Drawing;
 use crate::world::{Body, Geometry, World};
 use polyptych_core::convert::{Converter, Detail};
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
@@ -56,6 +58,33 @@ fn info() -> BackendInfo {
                 quality_axis: true,
             },
             Parameter {
+                name: "volume.gradients",
+                kind: ParameterKind::Choice { choices: &["found", "kept"] },
+                default: Value::Text("found".to_owned()),
+                unit: "",
+                help: "whether gradients of volumes are found for each sample, or kept with five times the memory",
+                tag: "volume.gradients",
+                quality_axis: false,
+            },
+            Parameter {
+                name: "volume.levels",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(false),
+                unit: "",
+                help: "whether volumes of which many samples are in a pixel are drawn from averages of samples",
+                tag: "volume.levels",
+                quality_axis: false,
+            },
+            Parameter {
+                name: "volume.surface",
+                kind: ParameterKind::Bool,
+                default: Value::Bool(false),
+                unit: "",
+                help: "whether volumes are drawn as the surface where their opacity passes half of its greatest",
+                tag: "volume.surface",
+                quality_axis: false,
+            },
+            Parameter {
                 name: "roots.precision",
                 kind: ParameterKind::Choice { choices: &["single", "double"] },
                 default: Value::Text("single".to_owned()),
@@ -63,6 +92,15 @@ fn info() -> BackendInfo {
                 help: "numbers in which roots of free forms are searched for; both end with a step in double precision",
                 tag: "roots.precision",
                 quality_axis: true,
+            },
+            Parameter {
+                name: "edge.rays",
+                kind: ParameterKind::Choice { choices: &["1", "2", "4", "8"] },
+                default: Value::Text("1".to_owned()),
+                unit: "rays",
+                help: "rays along each edge of a pixel in which edges or thin things may be",
+                tag: "edge.rays",
+                quality_axis: false,
             },
             Parameter {
                 name: "shadow",
@@ -83,8 +121,10 @@ pub struct Freeform {
     /// What was built of each shape, under the address of the shape, which is kept alive.
     kept: HashMap<usize, (Arc<Shape>, Arc<Geometry>)>,
     world: Option<World>,
-    /// Step through volumes in units of their smallest spacing.
-    volume_step: f64,
+    /// How the volumes that are kept are drawn.
+    volumes: Drawing,
+    /// Rays along each edge of a pixel in which there are edges.
+    edge_rays: u32,
     scratch: Vec<Mutex<Scratch>>,
     bytes: u64,
 }
@@ -103,7 +143,8 @@ impl Freeform {
             info: info(),
             kept: HashMap::new(),
             world: None,
-            volume_step: 0.5,
+            volumes: Drawing { step: 0.5, keeps_gradients: false, has_levels: false, as_surface: false },
+            edge_rays: 1,
             scratch: Vec::new(),
             bytes: 0,
         }
@@ -111,6 +152,22 @@ impl Freeform {
 
     fn detail(&self, need: &Need, object: &Object) -> Detail {
         seam::detail(object, need, need.settings.int(&self.info.parameters, "detail.resolution") as u32)
+    }
+
+    /// How volumes are to be drawn.
+    fn drawing(&self, need: &Need) -> Drawing {
+        let (settings, declared) = (&need.settings, &self.info.parameters);
+        Drawing {
+            step: settings.float(declared, "volume.step"),
+            keeps_gradients: settings.text(declared, "volume.gradients") == "kept",
+            has_levels: settings.bool(declared, "volume.levels"),
+            as_surface: settings.bool(declared, "volume.surface"),
+        }
+    }
+
+    /// Says how a shape is drawn that is not converted.
+    fn as_given(&self, shape: &Shape) -> Decision {
+        unconverted(shape, self.volumes)
     }
 
     /// What a picture takes.
@@ -130,17 +187,30 @@ impl Freeform {
     ) -> Result<(Arc<Geometry>, Decision), String> {
         let key = Arc::as_ptr(&object.shape) as usize;
         if let Some((_, geometry)) = self.kept.get(&key) {
-            return Ok((geometry.clone(), Decision::Exact));
+            return Ok((geometry.clone(), self.as_given(&object.shape)));
         }
-        if let Some(geometry) = Geometry::of(&object.shape, self.volume_step) {
+        if let Some(geometry) = Geometry::of(&object.shape, self.volumes) {
             let geometry = Arc::new(geometry);
             self.kept.insert(key, (object.shape.clone(), geometry.clone()));
-            return Ok((geometry, Decision::Exact));
+            return Ok((geometry, self.as_given(&object.shape)));
         }
         let detail = self.detail(need, object);
         let model = converter.distance(scene, object, detail, control.threads).map_err(|e| e.reason)?;
         let decision = converted(object, model.bound, &model.why);
         Ok((Arc::new(Geometry::Field(model)), decision))
+    }
+}
+
+/// Says how a shape is drawn that is not converted.
+pub(crate) fn unconverted(shape: &Shape, volumes: Drawing) -> Decision {
+    match shape {
+        Shape::Volume(volume) if volumes.as_surface => {
+            let value = volume.transfer.surface_value();
+            Decision::Approximated {
+                why: format!("surface at value {value:.4}; what is translucent is lost"),
+            }
+        }
+        _ => Decision::Exact,
     }
 }
 
@@ -176,8 +246,7 @@ impl Renderer for Freeform {
     fn plan(&self, scene: &Scene, need: &Need) -> Plan {
         let lights = scene.all_lights();
         let demand = self.demand(scene, need, &lights);
-        let step = need.settings.float(&self.info.parameters, "volume.step");
-        plan(scene, need, &demand, step, |object| self.detail(need, object))
+        plan(scene, need, &demand, self.drawing(need), |object| self.detail(need, object))
     }
 
     fn prepare(
@@ -187,15 +256,16 @@ impl Renderer for Freeform {
         converter: &Converter,
         control: &Control<'_>,
     ) -> Result<Prepared, RenderError> {
-        let volume_step = need.settings.float(&self.info.parameters, "volume.step");
+        let volumes = self.drawing(need);
         let precision = match need.settings.text(&self.info.parameters, "roots.precision") {
             "double" => Precision::Double,
             _ => Precision::Single,
         };
-        if volume_step != self.volume_step {
+        self.edge_rays = need.settings.text(&self.info.parameters, "edge.rays").parse().unwrap_or(1);
+        if volumes != self.volumes {
             // Opacities are kept for samples so far apart.
             self.kept.retain(|_, (_, geometry)| !matches!(**geometry, Geometry::Volume(_)));
-            self.volume_step = volume_step;
+            self.volumes = volumes;
         }
         // Shapes that are gone from the scene are let go.
         self.kept.retain(|_, (shape, _)| scene.objects.iter().any(|o| Arc::ptr_eq(&o.shape, shape)));
@@ -244,19 +314,28 @@ impl Renderer for Freeform {
     ) -> Result<Report, RenderError> {
         let world = self.world.as_ref().ok_or(RenderError::NotPrepared)?;
         let mut phases = Phases::start();
-        let drawing = FrameDrawing {
-            world,
-            view: frame.camera.view(target.width(), target.height()),
-            channels: target.channels(),
-        };
+        let (width, height, rays) = (target.width(), target.height(), self.edge_rays);
+        let view = frame.camera.view(width, height);
+        let drawing = FrameDrawing { world, view, channels: target.channels(), corner: [0; 2] };
+        let fine_view = frame.camera.view(width.saturating_mul(rays), height.saturating_mul(rays));
+        let edges = Edges { world, view, fine_view, height, rays };
+        let shows = [Channel::Color, Channel::Coverage].iter().any(|&c| target.channels().has(c));
         let bands = target.height().div_ceil(TILE) as usize;
         if self.scratch.len() < bands {
             self.scratch.resize_with(bands, Mutex::default);
         }
         let scratch = &self.scratch;
-        target.for_each_band(control.threads, TILE, &|band| {
+        target.for_each_band(control.threads, TILE, &|mut band| {
             let own = &scratch[(band.first_row / TILE) as usize];
-            drawing.band(band, &mut own.lock().unwrap_or_else(PoisonError::into_inner), control);
+            let mut own = own.lock().unwrap_or_else(PoisonError::into_inner);
+            drawing.band(&mut band, &mut own, control);
+            if rays > 1 && shows && !control.is_cancelled() {
+                let more = edges.refine(&mut band, &mut own.fine);
+                own.traced += more;
+            }
+            if !control.is_cancelled() {
+                control.finished(&band);
+            }
         });
         control.check()?;
         phases.end("draw");

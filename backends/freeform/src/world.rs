@@ -4,8 +4,10 @@ use crate::bundle::{Crossing, Hits, NOWHERE, Rays};
 use crate::field;
 use crate::form::{Cast, FormBody, FormScratch, Precision};
 use crate::heights::{HeightBody, HeightScratch};
-use crate::volume::{Shine, VolumeBody};
-use glam::{DAffine3, DMat3, DVec3};
+use crate::march::Shine;
+use crate::surface;
+use crate::volume::{Drawing, VolumeBody};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use polyptych_core::convert::DistanceModel;
 use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
 use polyptych_core::math::Aabb;
@@ -48,7 +50,7 @@ pub(crate) struct Body {
 /// Scratch memory of one worker for casting rays.
 #[derive(Default)]
 pub(crate) struct CastScratch {
-    form: FormScratch,
+    pub(crate) form: FormScratch,
     heights: HeightScratch,
 }
 
@@ -92,9 +94,9 @@ impl Points<'_> {
 }
 
 impl Geometry {
-    /// Builds what is cast of a shape that is drawn as given, with steps through volumes in units of their spacing;
-    /// nothing for meshes and voxels.
-    pub(crate) fn of(shape: &Shape, volume_step: f64) -> Option<Self> {
+    /// Builds what is cast of a shape that is drawn as given, volumes as told; nothing for meshes and
+    /// voxels.
+    pub(crate) fn of(shape: &Shape, volumes: Drawing) -> Option<Self> {
         Some(match shape {
             Shape::Primitive(Primitive::Plane { width, depth }) => {
                 Self::Plane { width: *width, depth: *depth }
@@ -102,13 +104,13 @@ impl Geometry {
             Shape::Primitive(primitive) => Self::Form(FormBody::new(&FreeForm::from_primitive(primitive)?)),
             Shape::FreeForm(form) => Self::Form(FormBody::new(form)),
             Shape::HeightField(heights) => Self::Heights(HeightBody::new(heights)),
-            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume, volume_step)),
+            Shape::Volume(volume) => Self::Volume(VolumeBody::new(volume, volumes)),
             Shape::Mesh(_) | Shape::Voxels(_) => return None,
         })
     }
 
     /// Returns what [`Geometry::bytes`] will be for a shape that is drawn as given; nothing for others.
-    pub(crate) fn planned_bytes(shape: &Shape) -> u64 {
+    pub(crate) fn planned_bytes(shape: &Shape, volumes: Drawing) -> u64 {
         match shape {
             Shape::Primitive(Primitive::Plane { .. }) => 16,
             // A form as steps is as large as what is written of it here.
@@ -117,7 +119,7 @@ impl Geometry {
             }
             Shape::FreeForm(form) => FormBody::new(form).bytes(),
             Shape::HeightField(heights) => HeightBody::planned_bytes(heights),
-            Shape::Volume(volume) => VolumeBody::planned_bytes(volume),
+            Shape::Volume(volume) => VolumeBody::planned_bytes(volume, volumes),
             Shape::Mesh(_) | Shape::Voxels(_) => 0,
         }
     }
@@ -180,7 +182,7 @@ impl Body {
     }
 
     pub(crate) fn is_volume(&self) -> bool {
-        matches!(*self.geometry, Geometry::Volume(_))
+        matches!(&*self.geometry, Geometry::Volume(volume) if volume.surface.is_none())
     }
 
     /// Improves `hits` where a ray meets the surface sooner. Volumes have none.
@@ -193,7 +195,7 @@ impl Body {
         scratch: &mut CastScratch,
     ) {
         match (&*self.geometry, &*self.shape) {
-            (Geometry::Volume(_), _) => return,
+            (Geometry::Volume(volume), _) if volume.surface.is_none() => return,
             (Geometry::Form(form), _) => {
                 let cast = Cast {
                     object_from_world: &self.object_from_world,
@@ -220,8 +222,12 @@ impl Body {
                 if near > far {
                     continue;
                 }
-                let t = match &*self.geometry {
-                    Geometry::Field(model) => field::cast(model, origin, direction, near, far),
+                let t = match (&*self.geometry, &*self.shape) {
+                    (Geometry::Field(model), _) => field::cast(model, origin, direction, near, far),
+                    (
+                        Geometry::Volume(VolumeBody { levels, surface: Some(value), .. }),
+                        Shape::Volume(volume),
+                    ) => surface::cast(&levels[0], (volume, *value), origin, direction, [near, far]),
                     // The bounds of a plane are the plane.
                     _ => (direction.y != 0.0 && near > 0.0).then_some(near),
                 };
@@ -264,6 +270,7 @@ impl Body {
             } else {
                 (place.material.base_color, place.material.opacity)
             };
+            let c = place.color.unwrap_or(c);
             normal.set(i, place.normal);
             color.set(i, c);
             opacity.0[i] = place.material.effective_opacity(o);
@@ -295,22 +302,33 @@ impl Body {
         match (&*self.geometry, &*self.shape) {
             (Geometry::Form(_), Shape::Primitive(primitive)) => {
                 let uv = Some(primitive.uv(local, normal.normalize_or_zero()));
-                Place { normal, uv, material }
+                Place { normal, uv, material, color: None }
             }
             (Geometry::Plane { width, depth }, _) => {
                 let plane = Primitive::Plane { width: *width, depth: *depth };
-                Place { normal: DVec3::Y, uv: Some(plane.uv(local, DVec3::Y)), material }
+                Place { normal: DVec3::Y, uv: Some(plane.uv(local, DVec3::Y)), material, color: None }
             }
             (Geometry::Heights(_), Shape::HeightField(heights)) => {
                 let uv = Some(heights.uv(local.x, local.z));
-                Place { normal: heights.height_and_normal(local.x, local.z).1, uv, material }
+                Place { normal: heights.height_and_normal(local.x, local.z).1, uv, material, color: None }
             }
             (Geometry::Field(model), _) => {
                 let material =
                     model.palette.get(field::material(model, local)).unwrap_or(Material::fallback());
-                Place { normal: field::normal(model, local, direction), uv: None, material }
+                Place { normal: field::normal(model, local, direction), uv: None, material, color: None }
             }
-            _ => Place { normal, uv: None, material },
+            (Geometry::Volume(body), Shape::Volume(volume)) => {
+                // On the cut of a shell the field is higher than at the surface.
+                let value = (volume.value(local) as f32).max(body.surface.unwrap_or_default());
+                let normal = match &volume.shell {
+                    Some(shell) if shell.form().value(local).abs() < 1e-3 * shell.bounds().radius() => {
+                        -shell.form().value_and_gradient(local).1
+                    }
+                    _ => -volume.gradient(local),
+                };
+                Place { normal, uv: None, material, color: Some(volume.transfer.at(value).0) }
+            }
+            _ => Place { normal, uv: None, material, color: None },
         }
     }
 }
@@ -320,4 +338,6 @@ struct Place<'a> {
     normal: DVec3,
     uv: Option<[f32; 2]>,
     material: &'a Material,
+    /// In place of the material's.
+    color: Option<Vec3>,
 }

@@ -9,7 +9,7 @@
 //! | far from the origin, trembling there | `far-from-origin`, `trembling` |
 //! | grazing views | `grazing`, `texture-grazing` |
 //! | coplanar and nearly coplanar faces, flicker | `coplanar`, `coplanar-flicker` |
-//! | thin things, small things | `thin`, `thin-flicker`, `specks` |
+//! | thin things, small things | `thin`, `thin-edges`, `thin-flicker`, `specks` |
 //! | the near plane, the eye inside | `near`, `near-voxels`, `under-heights` |
 //! | shadows: contact and slope | `shadow-contact`, `shadow-slope` |
 //! | wide lenses | `field-of-view`, `fisheye` |

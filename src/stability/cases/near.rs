@@ -1,7 +1,7 @@
 //! Which cases are about faces seen at a slant, near each other, near the eye, thin or huge?
 
 use super::super::count::Count;
-use super::super::scenes;
+use super::super::scenes::{self, Setup};
 use super::{Case, base, powers};
 
 pub(super) fn cases() -> Vec<Case> {
@@ -36,6 +36,18 @@ pub(super) fn cases() -> Vec<Case> {
             build: scenes::thin,
             count: Count::Energy,
             better: Some(("4 x 4 samples a pixel in the host", scenes::supersampled)),
+            ..base()
+        },
+        Case {
+            id: "thin-edges",
+            title: "A glowing rod, thinner and thinner, with 8 x 8 rays where edges or thin things may be",
+            parameter: "thickness, pixels",
+            values: vec![10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01],
+            limit: 0.25,
+            counted: "light that is missing or too much, as a share",
+            backends: &["freeform"],
+            build: thin_edges,
+            count: Count::Energy,
             ..base()
         },
         Case {
@@ -74,4 +86,10 @@ pub(super) fn cases() -> Vec<Case> {
             ..base()
         },
     ]
+}
+
+fn thin_edges(pixels: f64) -> Setup {
+    let mut setup = scenes::thin(pixels);
+    setup.settings.push(("edge.rays", "8".to_owned()));
+    setup
 }

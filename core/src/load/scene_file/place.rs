@@ -3,6 +3,7 @@
 use super::schema_views::{CameraEntry, LightEntry, LightKindEntry, ProjectionEntry, Scale, TransformEntry};
 use crate::camera::{Camera, Projection};
 use crate::load::error::Fault;
+use crate::projector::Projector;
 use crate::scene::{Light, LightKind};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -156,6 +157,18 @@ pub(super) fn camera(entry: &CameraEntry) -> Result<Camera, Fault> {
             fov_x: angle("fov_x_deg", fov_x_deg, 360.0)?,
             fov_y: angle("fov_y_deg", fov_y_deg, 179.0)?,
         },
+        ProjectionEntry::Projector { at, toward, fov_y_deg, aspect, screen } => {
+            let fov_y = angle("fov_y_deg", fov_y_deg, 179.0)?;
+            if !(0.01..=100.0).contains(&aspect) {
+                return Err(usage(format!("`aspect` is {aspect}"), "give a number from 0.01 to 100"));
+            }
+            let [at, toward] = [at, toward].map(DVec3::from_array);
+            let lens = Camera::look_at(at, toward, up, Projection::Perspective { fov_y });
+            // A table as fine as for a picture of that height.
+            return Projector { lens, screen }
+                .camera(eye, (aspect * 1080.0) as u32, 1080)
+                .map_err(|e| usage(e, "give finite places and a radius above 0"));
+        }
     };
     Ok(Camera::look_at(eye, target, up, projection))
 }
@@ -188,6 +201,29 @@ pub(super) fn usage(what: impl Into<String>, advice: impl Into<std::borrow::Cow<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_projector_is_a_camera_of_its_viewer() {
+        let text = r##"(name: "dome", eye: (1, 0, 0.5), target: (1, 0, -4), projection: Projector(at: (0, 0, 2),
+            toward: (0, 1, -5), fov_y_deg: 70, aspect: 1.6, screen: Dome(center: (0, 0, 0), radius: 5)))"##;
+        let entry: CameraEntry = ron::from_str(text).unwrap();
+        let built = camera(&entry).unwrap();
+        assert_eq!(built.eye, DVec3::new(1.0, 0.0, 0.5));
+        // What is thrown upon the middle of the picture lies behind where the lens looks.
+        let lens = (DVec3::new(0.0, 1.0, -5.0) - DVec3::new(0.0, 0.0, 2.0)).normalize_or_zero();
+        let ray = built.view(1728, 1080).ray(864.0, 540.0).unwrap();
+        let on_dome = (0..9000).map(|i| DVec3::new(0.0, 0.0, 2.0) + lens * f64::from(i) * 1e-3);
+        let point =
+            on_dome.min_by(|a, b| (a.length() - 5.0).abs().total_cmp(&(b.length() - 5.0).abs())).unwrap();
+        assert!(ray.direction.angle_between(point - built.eye) < 2e-3, "{}", ray.direction);
+        let ProjectionEntry::Projector { at, toward, fov_y_deg, screen, .. } = entry.projection else {
+            panic!()
+        };
+        for aspect in [0.0, f64::NAN] {
+            let projection = ProjectionEntry::Projector { at, toward, fov_y_deg, aspect, screen };
+            assert!(camera(&CameraEntry { projection, ..entry.clone() }).is_err());
+        }
+    }
 
     #[test]
     fn angles_turn_around_x_then_y_then_z() {

@@ -1,6 +1,7 @@
 //! The words of a scene file for places, lights and cameras.
 
 use super::schema::{is_true, yes};
+use crate::projector::Screen;
 use crate::scene::color_text;
 use glam::Vec3;
 use schemars::JsonSchema;
@@ -139,6 +140,19 @@ pub enum ProjectionEntry {
         fov_x_deg: f64,
         /// Vertical field of view at eye level.
         fov_y_deg: f64,
+    },
+    /// A projector before a curved screen: the camera's eye is the viewer's, for whom the picture looks right.
+    Projector {
+        /// Where the projector is.
+        at: [f64; 3],
+        /// What its lens looks at.
+        toward: [f64; 3],
+        /// Vertical field of view of its lens.
+        fov_y_deg: f64,
+        /// Width of its picture over the height.
+        aspect: f64,
+        /// What it throws its picture on.
+        screen: Screen,
     },
 }
 
