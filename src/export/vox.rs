@@ -16,6 +16,8 @@ const LONGEST: u32 = 256;
 const MOST_COLORS: usize = 255;
 /// Beyond this the file's 32-bit lengths would not do.
 const MOST_BYTES: u64 = 1 << 31;
+/// Shininess that the reader gives to all that is smooth enough.
+const SHINIEST: f32 = 1024.0;
 
 /// Tells whether all that is visible are grids of one lattice: turned by quarters and moved by whole cells, with no more
 /// materials than a palette holds.
@@ -246,7 +248,13 @@ fn color(material: &Material) -> [u8; 4] {
 /// Describes a material in the words of the format, which knows one kind for each: light, else glass, else mirror, else
 /// matte. Read back they give the same emission, opacity and reflectivity.
 fn properties(material: &Material) -> Vec<(&'static str, String)> {
-    let rough = (2.0 / (material.shininess.max(4.0) + 2.0)).powf(0.25).clamp(0.0, 1.0);
+    let shiny = (2.0 / (material.shininess.max(4.0) + 2.0)).powf(0.25).clamp(0.0, 1.0);
+    // Where a mirror is as shiny as can be, a smoother one is only brighter.
+    let rough = if material.shininess >= SHINIEST && material.specular > 0.0 {
+        (1.0 - material.reflectivity / material.specular).clamp(0.0, shiny)
+    } else {
+        shiny
+    };
     let metal = (material.reflectivity / (0.6 * (1.0 - rough))).clamp(0.0, 1.0);
     let number = |value: f32| value.to_string();
     if material.emission != Vec3::ZERO {
@@ -398,6 +406,22 @@ mod tests {
         }
         scene.objects[0].world_from_object.translation.x += 0.25;
         assert!(!is_lattice(&scene));
+    }
+
+    #[test]
+    fn the_smoothest_mirrors_stay_as_bright() {
+        let mut mirror =
+            Material { reflectivity: 0.576, specular: 0.6, shininess: 1024.0, ..materials()[0].clone() };
+        for reflectivity in [0.576, 0.5, 0.6] {
+            mirror.reflectivity = reflectivity;
+            let mut scene = Scene { materials: vec![mirror.clone()], ..Scene::default() };
+            let grid = Voxels::from_fn([1; 3], |_, _, _| 1);
+            scene.objects.push(Object { materials: vec![0], ..Object::new("cell", Shape::Voxels(grid), 0) });
+            let (back, _) = round_trip(&scene, "mirror");
+            let read = back.material(&back.objects[0], 0);
+            assert!((read.reflectivity - reflectivity).abs() < 1e-5, "{reflectivity}: {}", read.reflectivity);
+            assert_eq!((read.specular, read.shininess), (mirror.specular, mirror.shininess));
+        }
     }
 
     #[test]
