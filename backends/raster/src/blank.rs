@@ -36,18 +36,13 @@ pub(crate) struct Stays {
 impl Blank {
     /// Begins a frame of so many tiles.
     pub(crate) fn begin(&mut self, target: &Framebuffer, tiles: usize, lens: &Lens, background: &Background) {
-        let before = self.drawn.take();
-        let color = Channel::Color as usize;
-        let is_kept = |drawn: &&Drawn| {
-            let now = target.written();
-            now.is_some_and(|now| (0..now.len()).all(|i| i == color || now[i] == drawn.written[i]))
-        };
-        self.stays = before.as_ref().filter(is_kept).map_or(Stays::default(), |drawn| Stays {
-            nothing: true,
-            color: target.written().is_some_and(|now| now[color] == drawn.written[color])
-                && drawn.directions == lens.direction
-                && drawn.background == *background,
-        });
+        self.stays = Stays::default();
+        if let (Some(drawn), Some(now)) = (self.drawn.take(), target.written()) {
+            let is_kept = |channel: &Channel| now[*channel as usize] == drawn.written[*channel as usize];
+            let nothing = Channel::ALL.iter().filter(|c| **c != Channel::Color).all(is_kept);
+            let is_same = drawn.directions == lens.direction && drawn.background == *background;
+            self.stays = Stays { nothing, color: is_kept(&Channel::Color) && is_same };
+        }
         if self.tiles.len() != tiles {
             self.tiles.resize_with(tiles, AtomicBool::default);
             self.stays = Stays::default();
