@@ -28,24 +28,14 @@ pub(crate) fn ids(from: &[u32], first: usize, count: usize) -> [u32; LANES] {
     all
 }
 
-/// Returns the bits that any of some ids has. Counts are constant where they can be: of loops whose ends it does not
-/// know the compiler makes no vectors so short.
+/// Returns the bits that any of some ids has.
 #[inline(always)]
 pub(crate) fn union<const N: usize>(ids: &[u32]) -> u32 {
-    let mut any = 0;
-    if let Ok(all) = <&[u32; N]>::try_from(ids) {
-        for id in all {
-            any |= id;
-        }
-    } else {
-        for id in ids {
-            any |= id;
-        }
-    }
-    any
+    difference::<N>(ids, 0)
 }
 
-/// Returns the bits in which any of some ids differ from one.
+/// Returns the bits in which any of some ids differ from one. Counts are constant where they can be: of loops whose ends
+/// it does not know the compiler makes no vectors so short.
 #[inline(always)]
 pub(crate) fn difference<const N: usize>(ids: &[u32], one: u32) -> u32 {
     let mut any = 0;
