@@ -1,9 +1,10 @@
 //! How are eight numbers reckoned at once? As plain arrays: the compiler turns each operation into the widest
 //! registers that a kernel may use, and into the same bytes whatever their width.
 //!
-//! A kernel is written once over these types, compiled for the plain processor and for its extensions
-//! (`#[target_feature(enable = "avx2")]`), and chosen at run time. Fixed arrays alone would not do: the compiler
-//! unrolls a long loop body over eight numbers before it looks for vectors in it.
+//! A kernel is written once over these types, compiled for the plain processor and for its extensions, and chosen at
+//! run time: see [`registers`](crate::registers).
+//! Fixed arrays alone would not do: the compiler unrolls a long loop body over eight numbers before it looks for
+//! vectors in it.
 
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 

@@ -19,6 +19,7 @@ pub mod metrics;
 pub mod parallel;
 pub mod pixels;
 pub mod projector;
+pub mod registers;
 pub mod scene;
 pub mod seam;
 pub mod shade;

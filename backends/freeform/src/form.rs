@@ -152,28 +152,14 @@ impl FormBody {
         (self.program.steps.len() * 24 + self.program.leaves.len() * 80) as u64
     }
 
-    /// Improves `hits` where a ray meets the form sooner.
-    pub(crate) fn cast(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.cast_avx2(cast, rays, hits, scratch) };
-        }
-        self.cast_plain(cast, rays, hits, scratch);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn cast_avx2(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch) {
-        self.cast_plain(cast, rays, hits, scratch);
+    polyptych_core::for_registers! {
+        /// Improves `hits` where a ray meets the form sooner.
+        pub(crate) fn cast(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch)
+            = cast_512, cast_256, cast_here;
     }
 
     #[inline(always)]
-    fn cast_plain(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch) {
+    fn cast_here(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch) {
         self.enter(cast.object_from_world, rays, hits, &mut scratch.alive);
         let bounded = scratch
             .alive
@@ -502,6 +488,7 @@ impl Parabola {
 pub(crate) mod tests {
     use super::*;
     use polyptych_core::lanes::LANES;
+    use polyptych_core::registers::Registers;
 
     /// Returns quadrics along rays in single precision, looked at up to `reach` around one distance, from a point
     /// that no ray is further from than `size`.
@@ -523,12 +510,8 @@ pub(crate) mod tests {
     }
 
     /// Casts rays at the figure that uses every step, with the widest registers and with the plainest.
-    #[cfg(target_arch = "x86_64")]
     #[test]
     fn bytes_do_not_depend_on_the_registers() {
-        if !std::arch::is_x86_feature_detected!("avx2") {
-            return;
-        }
         let form = FreeForm::new(crate::program::tests::everything()).unwrap();
         let body = FormBody::new(&form);
         let mut rays = Vec::new();
@@ -542,16 +525,13 @@ pub(crate) mod tests {
             }
             rays.push(Rays { origin, direction, near: F64x8::ZERO, far: F64x8::splat(9.0) });
         }
-        let bits = |wide: bool, (crossing, precision): (Crossing, Precision)| {
+        let bits = |registers: Registers, (crossing, precision): (Crossing, Precision)| {
             let mut hits: Vec<Hits> = rays.iter().map(Hits::nothing).collect();
             let mut scratch = FormScratch::default();
             let place = DAffine3::from_rotation_y(0.3);
             let cast = Cast { object_from_world: &place, body: 7, crossing, precision };
-            if wide {
-                body.cast(cast, &rays, &mut hits, &mut scratch);
-            } else {
-                body.cast_plain(cast, &rays, &mut hits, &mut scratch);
-            }
+            registers.limit();
+            body.cast(cast, &rays, &mut hits, &mut scratch);
             let numbers = |h: &Hits| {
                 let normal = h.normal;
                 (h.body.0, [h.t, normal.x, normal.y, normal.z].map(|v| v.0.map(f64::to_bits)))
@@ -561,9 +541,9 @@ pub(crate) mod tests {
         let ways = [Crossing::Any, Crossing::Entry]
             .map(|c| [Precision::Single, Precision::Double].map(|precision| (c, precision)));
         for way in ways.into_iter().flatten() {
-            let (wide, plain) = (bits(true, way), bits(false, way));
-            let met = wide.iter().flat_map(|h| h.0).filter(|b| *b == 7).count();
-            assert!(wide == plain, "{way:?}");
+            let [plain, wider, widest] = Registers::ALL.map(|registers| bits(registers, way));
+            let met = plain.iter().flat_map(|h| h.0).filter(|b| *b == 7).count();
+            assert!(wider == plain && widest == plain, "{way:?}");
             assert!((60..240).contains(&met), "{met} of 256");
         }
     }

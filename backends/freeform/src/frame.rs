@@ -63,35 +63,14 @@ impl FrameDrawing<'_> {
         }
     }
 
-    fn draw_tile<'a>(
-        &'a self,
-        band: &mut Band<'_>,
-        first: u32,
-        lit: &mut [Lit<'a>; OCTETS],
-        scratch: &mut Scratch,
-    ) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.tile_avx2(band, first, lit, scratch) };
-        }
-        self.tile(band, first, lit, scratch);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn tile_avx2<'a>(
-        &'a self,
-        band: &mut Band<'_>,
-        first: u32,
-        lit: &mut [Lit<'a>; OCTETS],
-        scratch: &mut Scratch,
-    ) {
-        self.tile(band, first, lit, scratch);
+    polyptych_core::for_registers! {
+        fn draw_tile<'a>(
+            &'a self,
+            band: &mut Band<'_>,
+            first: u32,
+            lit: &mut [Lit<'a>; OCTETS],
+            scratch: &mut Scratch,
+        ) = tile_512, tile_256, tile;
     }
 
     #[inline(always)]

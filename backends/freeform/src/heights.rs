@@ -81,44 +81,21 @@ impl HeightBody {
         self.levels.iter().map(|l| l.ranges.len() as u64 * 8).sum()
     }
 
-    /// Improves `hits` where a ray of a tile meets the surface sooner.
-    pub(crate) fn cast(
-        &self,
-        field: &HeightField,
-        object_from_world: &DAffine3,
-        body: u32,
-        rays: &[Rays],
-        hits: &mut [Hits],
-        scratch: &mut HeightScratch,
-    ) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.cast_avx2(field, object_from_world, body, rays, hits, scratch) };
-        }
-        self.cast_plain(field, object_from_world, body, rays, hits, scratch);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn cast_avx2(
-        &self,
-        field: &HeightField,
-        object_from_world: &DAffine3,
-        body: u32,
-        rays: &[Rays],
-        hits: &mut [Hits],
-        scratch: &mut HeightScratch,
-    ) {
-        self.cast_plain(field, object_from_world, body, rays, hits, scratch);
+    polyptych_core::for_registers! {
+        /// Improves `hits` where a ray of a tile meets the surface sooner.
+        pub(crate) fn cast(
+            &self,
+            field: &HeightField,
+            object_from_world: &DAffine3,
+            body: u32,
+            rays: &[Rays],
+            hits: &mut [Hits],
+            scratch: &mut HeightScratch,
+        ) = cast_512, cast_256, cast_here;
     }
 
     #[inline(always)]
-    fn cast_plain(
+    fn cast_here(
         &self,
         field: &HeightField,
         object_from_world: &DAffine3,

@@ -95,28 +95,13 @@ struct Found {
 }
 
 impl March<'_> {
-    /// Adds the samples from the first numbers up to the second ones.
-    pub(crate) fn run(&self, samples: [I32x8; 2], open: Mask8, sum: &mut Gathered) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.run_avx2(samples, open, sum) };
-        }
-        self.run_plain(samples, open, sum);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn run_avx2(&self, samples: [I32x8; 2], open: Mask8, sum: &mut Gathered) {
-        self.run_plain(samples, open, sum);
+    polyptych_core::for_registers! {
+        /// Adds the samples from the first numbers up to the second ones.
+        pub(crate) fn run(&self, samples: [I32x8; 2], open: Mask8, sum: &mut Gathered) = run_512, run_256, run_here;
     }
 
     #[inline(always)]
-    fn run_plain(&self, [first, end]: [I32x8; 2], open: Mask8, sum: &mut Gathered) {
+    fn run_here(&self, [first, end]: [I32x8; 2], open: Mask8, sum: &mut Gathered) {
         let (path, one, opaque) = (self.path(), I32x8::splat(1), F32x8::splat(OPAQUE));
         let mut found = Found { waiting: Mask8::NONE, value: F32x8::ZERO, opacity: F32x8::ZERO };
         let mut i = first;

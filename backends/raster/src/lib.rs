@@ -83,6 +83,5 @@ mod surfaces;
 mod tests;
 mod tile;
 mod transform;
-mod wide;
 
 pub use renderer::{Factory, Raster};

@@ -133,29 +133,9 @@ impl<'a> Painter<'a> {
         if stopped.into_inner() { Err(Cancelled) } else { Ok(shaded.into_inner()) }
     }
 
-    fn paint_tile(&self, grid: &TileGrid, tile: usize, band: &mut Band<'_>, scratch: &mut Scratch) -> u64 {
-        #[cfg(target_arch = "x86_64")]
-        if crate::wide::has_avx2() {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.paint_tile_avx2(grid, tile, band, scratch) };
-        }
-        self.paint_tile_here(grid, tile, band, scratch)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn paint_tile_avx2(
-        &self,
-        grid: &TileGrid,
-        tile: usize,
-        band: &mut Band<'_>,
-        scratch: &mut Scratch,
-    ) -> u64 {
-        self.paint_tile_here(grid, tile, band, scratch)
+    polyptych_core::for_registers! {
+        fn paint_tile(&self, grid: &TileGrid, tile: usize, band: &mut Band<'_>, scratch: &mut Scratch) -> u64
+            = paint_tile_512, paint_tile_256, paint_tile_here;
     }
 
     #[inline(always)]
@@ -315,24 +295,10 @@ impl<'a> Painter<'a> {
         batch.push(place, [id, part as u32, id - model.parts[part].first_triangle], face, tag);
     }
 
-    /// Finds and lights the surfaces of a batch. This is where most time goes: one kernel, called from everywhere.
-    pub(crate) fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
-        #[cfg(target_arch = "x86_64")]
-        if crate::wide::has_avx2() {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.light_avx2(batch, faces, corners) };
-        }
-        self.light_here(batch, faces, corners);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn light_avx2(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud) {
-        self.light_here(batch, faces, corners);
+    polyptych_core::for_registers! {
+        /// Finds and lights the surfaces of a batch. This is where most time goes: one kernel, called from everywhere.
+        pub(crate) fn light(&self, batch: &mut Batch<'a>, faces: &Faces, corners: &mut Gouraud)
+            = light_512, light_256, light_here;
     }
 
     #[inline(always)]

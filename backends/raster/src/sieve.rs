@@ -13,22 +13,11 @@ struct Eight {
     all: [u32; LANES],
 }
 
-/// Returns one bit for each of up to eight triangles: whether it may cover a pixel. `reach` is how far from a pixel's
-/// center it may be looked at, in steps.
-pub(crate) fn may_cover(vertices: PartOnScreen<'_>, triangles: &[[u32; 3]], reach: i32) -> u32 {
-    #[cfg(target_arch = "x86_64")]
-    if crate::wide::has_avx2() {
-        #[expect(unsafe_code, reason = "a kernel compiled for a processor feature can only be called so")]
-        // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-        return unsafe { may_cover_avx2(vertices, triangles, reach) };
-    }
-    may_cover_here(vertices, triangles, reach)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn may_cover_avx2(vertices: PartOnScreen<'_>, triangles: &[[u32; 3]], reach: i32) -> u32 {
-    may_cover_here(vertices, triangles, reach)
+polyptych_core::for_registers! {
+    /// Returns one bit for each of up to eight triangles: whether it may cover a pixel. `reach` is how far from a
+    /// pixel's center it may be looked at, in steps.
+    pub(crate) fn may_cover(vertices: PartOnScreen<'_>, triangles: &[[u32; 3]], reach: i32) -> u32
+        = may_cover_512, may_cover_256, may_cover_here;
 }
 
 #[inline(always)]

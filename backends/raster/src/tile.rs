@@ -70,29 +70,19 @@ impl TileBuffer {
     /// centers. Of equal depths the lowest id wins.
     pub(crate) fn of(bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2]) -> Self {
         let mut buffer = Self::new();
-        #[cfg(target_arch = "x86_64")]
-        if crate::wide::has_avx2() {
-            #[expect(unsafe_code, reason = "a kernel compiled for a processor feature can only be called so")]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            unsafe {
-                buffer.fill_avx2(bins, tile, area, place);
-            }
-            return buffer;
-        }
         buffer.fill(bins, tile, area, place);
         buffer
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn fill_avx2(&mut self, bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2]) {
-        self.fill(bins, tile, area, place);
+    polyptych_core::for_registers! {
+        fn fill(&mut self, bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2])
+            = fill_512, fill_256, fill_here;
     }
 
-    /// The same in the caller's instructions. What turns its back to the viewer is mostly hidden by what does not, and
-    /// most of it is told to be by a coarse look at the depths.
+    /// What turns its back to the viewer is mostly hidden by what does not, and most of it is told to be by a coarse
+    /// look at the depths.
     #[inline(always)]
-    fn fill(&mut self, bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2]) {
+    fn fill_here(&mut self, bins: &Bins, tile: usize, area: &TileArea, place: [i32; 2]) {
         // The compiler would make masked stores where something is kept or put back, and these take some processors
         // a dozen cycles each. It cannot where it does not know that both places are the same.
         let apart = std::hint::black_box(0);

@@ -75,6 +75,17 @@ impl<'a> PartOnScreen<'a> {
     }
 }
 
+polyptych_core::for_registers! {
+    /// Projects up to eight points.
+    fn project(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> ScreenVertices
+        = project_512, project_256, project_here;
+}
+
+#[inline(always)]
+fn project_here(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> ScreenVertices {
+    ScreenVertices::of(lens, screen_from_object, points)
+}
+
 impl ScreenVertices {
     const NONE: Self = Self {
         column: [0; LANES],
@@ -86,27 +97,8 @@ impl ScreenVertices {
     };
 
     /// Projects up to eight points.
-    fn of(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if crate::wide::has_avx2() {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { Self::of_avx2(lens, screen_from_object, points) };
-        }
-        Self::of_here(lens, screen_from_object, points)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn of_avx2(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> Self {
-        Self::of_here(lens, screen_from_object, points)
-    }
-
     #[inline(always)]
-    fn of_here(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> Self {
+    fn of(lens: &Lens, screen_from_object: &ScreenFromObject, points: &[Vec3]) -> Self {
         let mut gathered = Vec3x8::splat(Vec3::ZERO);
         for (lane, point) in points.iter().enumerate().take(LANES) {
             gathered.set(lane, *point);
@@ -156,7 +148,7 @@ pub(crate) fn transform(
         let of_part = &mut vertices[part.first_eight..][..positions.len().div_ceil(LANES)];
         for_each_mut(threads, of_part, GRAIN, &|i, eight| {
             let end = positions.len().min((i + 1) * LANES);
-            *eight = ScreenVertices::of(lens, &screen_from_object, &positions[i * LANES..end]);
+            *eight = project(lens, &screen_from_object, &positions[i * LANES..end]);
         });
     }
 }

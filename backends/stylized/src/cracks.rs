@@ -82,25 +82,9 @@ impl Scratch {
 }
 
 impl Surfaces<'_> {
-    /// Finds the lines of some rows: those that pass between them and the next. The widest registers there are find
-    /// the same.
-    pub(crate) fn find(&self, rows: std::ops::Range<u32>, scratch: &mut Scratch) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.find_avx2(rows, scratch) };
-        }
-        self.find_here(rows, scratch);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn find_avx2(&self, rows: std::ops::Range<u32>, scratch: &mut Scratch) {
-        self.find_here(rows, scratch);
+    polyptych_core::for_registers! {
+        /// Finds the lines of some rows: those that pass between them and the next.
+        pub(crate) fn find(&self, rows: std::ops::Range<u32>, scratch: &mut Scratch) = find_512, find_256, find_here;
     }
 
     #[inline(always)]

@@ -167,33 +167,20 @@ impl Hatching {
         self.levels.iter().map(|l| l.texels.len() as u64 * 4).sum()
     }
 
-    /// Returns how much of eight pixels strokes cover, at places of the pattern (1 is its period), on so much darkness.
-    /// `density` is how many texels of the largest map a pixel is wide.
-    ///
-    /// A kernel of its own: within that which paints rows it would stand there four times, and leave that no room in the
-    /// processor's cache of instructions.
-    pub(crate) fn ink(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8 {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.ink_avx2(u, v, density, darkness) };
-        }
-        self.ink_here(*u, *v, *density, *darkness)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn ink_avx2(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8 {
-        self.ink_here(*u, *v, *density, *darkness)
+    polyptych_core::for_registers! {
+        /// Returns how much of eight pixels strokes cover, at places of the pattern (1 is its period), on so much
+        /// darkness. `density` is how many texels of the largest map a pixel is wide.
+        ///
+        /// A kernel of its own: within that which paints rows it would stand there four times, and leave that no room
+        /// in the processor's cache of instructions.
+        pub(crate) fn ink(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8
+            = ink_512, ink_256, ink_here;
     }
 
     #[expect(clippy::needless_range_loop, reason = "several arrays are read and written lane by lane")]
     #[inline(always)]
-    fn ink_here(&self, u: F32x8, v: F32x8, density: F32x8, darkness: F32x8) -> F32x8 {
+    fn ink_here(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8 {
+        let (u, v, density, darkness) = (*u, *v, *density, *darkness);
         // The exponent of the density is the map, its mantissa the way to the next one.
         let bounded = density.max(F32x8::splat(2f32.powi(-20))).min(F32x8::splat(2f32.powi(20)));
         let (mut halvings, mut mantissa) = ([0i32; LANES], F32x8::ZERO);

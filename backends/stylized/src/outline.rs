@@ -139,24 +139,10 @@ fn turn(body: &Body, camera: &Camera, facing: &mut [bool], threads: &dyn Threads
 }
 
 impl Piece {
-    /// Finds the lines of a piece with the instructions that there are; the bytes do not depend on them.
-    fn find(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>, veil: &Veil) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.find_avx2(bodies, facing, sight, veil) };
-        }
-        self.find_here(bodies, facing, sight, veil);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn find_avx2(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>, veil: &Veil) {
-        self.find_here(bodies, facing, sight, veil);
+    polyptych_core::for_registers! {
+        /// Finds the lines of a piece.
+        fn find(&mut self, bodies: &[Body], facing: &[bool], sight: &Sight<'_>, veil: &Veil)
+            = find_512, find_256, find_here;
     }
 
     #[inline(always)]

@@ -51,24 +51,9 @@ pub(crate) struct Painting<'a> {
 }
 
 impl Painting<'_> {
-    /// Paints a band with the widest registers there are; the bytes do not depend on them.
-    pub(crate) fn draw(&self, band: &mut Band<'_>, scratch: &mut Scratch) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for a processor feature can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe { self.band_avx2(band, scratch) };
-        }
-        self.band(band, scratch);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn band_avx2(&self, band: &mut Band<'_>, scratch: &mut Scratch) {
-        self.band(band, scratch);
+    polyptych_core::for_registers! {
+        /// Paints a band.
+        pub(crate) fn draw(&self, band: &mut Band<'_>, scratch: &mut Scratch) = band_512, band_256, band;
     }
 
     #[inline(always)]

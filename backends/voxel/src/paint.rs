@@ -172,25 +172,10 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Draws a band tile by tile; false where the host stopped it.
-    pub(crate) fn paint(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("bmi2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for processor features can only be called so"
-            )]
-            // SAFETY: the processor has the features that the kernel was compiled for; it was just asked.
-            return unsafe { self.paint_avx2(tracer, band, control) };
-        }
-        self.paint_tiles(tracer, band, control)
-    }
-
-    /// The same code with newer instructions: none of them rounds in another way.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn paint_avx2(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
-        self.paint_tiles(tracer, band, control)
+    polyptych_core::for_registers! {
+        /// Draws a band tile by tile; false where the host stopped it.
+        pub(crate) fn paint(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool
+            = paint_tiles_512, paint_tiles_256, paint_tiles;
     }
 
     #[inline(always)]
@@ -266,25 +251,10 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Draws a tile in a function of its own: the kernel is large, and need not be there twice.
-    #[inline(never)]
-    fn draw_sample(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("bmi2") {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for processor features can only be called so"
-            )]
-            // SAFETY: the processor has the features that the kernel was compiled for; it was just asked.
-            return unsafe { self.draw_avx2(tracer, band, tile) };
-        }
-        self.draw(tracer, band, tile);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn draw_avx2(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
-        self.draw(tracer, band, tile);
+    polyptych_core::for_registers! {
+        /// Draws a tile in a function of its own: the kernel is large, and need not be there twice.
+        #[inline(never)]
+        fn draw_sample(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) = draw_512, draw_256, draw;
     }
 
     /// Sets up the rays of all pixels of a tile.

@@ -5,9 +5,9 @@ mod coverage;
 mod host;
 mod lines;
 mod pictures;
+mod registers;
 mod shadows;
 mod smooth;
-mod wide;
 
 use crate::Raster;
 use glam::{DVec3, Vec3};

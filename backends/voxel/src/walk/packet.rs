@@ -227,7 +227,7 @@ impl Packet {
     #[inline(always)]
     pub(crate) fn find_marked(&mut self, rays: &GridRays, layer: &Layer, order: Order) -> Hits {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if polyptych_core::registers::Registers::in_use() > polyptych_core::registers::Registers::Plain {
             #[expect(
                 unsafe_code,
                 reason = "a kernel compiled for processor features can only be called so"

@@ -1,10 +1,9 @@
 //! Do wide and plain registers give the same bytes?
 
 use super::{Random, camera, cube, draw_with, plane, scene_of, triangle};
-use crate::wide::PLAIN;
 use glam::Vec3;
+use polyptych_core::registers::Registers;
 use polyptych_core::scene::{Light, Mapping, Material, Scene, Shape, Texture};
-use std::sync::atomic::Ordering;
 
 /// Small, large, painted, clear and mirrored triangles, with lights of all kinds.
 fn medley() -> Scene {
@@ -58,12 +57,12 @@ fn pictures_do_not_depend_on_the_width_of_registers() {
         &[("shadow.tier", "plain")],
     ];
     for settings in sights {
-        let draw = |plain: bool| {
-            PLAIN.store(plain, Ordering::Relaxed);
+        let pictures = Registers::ALL.map(|registers| {
+            registers.limit();
             draw_with(&scene, camera([2.0, 2.5, 3.0], [0.0, 0.6, 0.0]), 203, 141, settings)
-        };
-        let (plain, wide) = (draw(true), draw(false));
-        assert!(plain.same_bits(&wide), "{settings:?}");
+        });
+        let [plain, wider, widest] = &pictures;
+        assert!(plain.same_bits(wider) && plain.same_bits(widest), "{settings:?}");
         assert!(plain.id().iter().filter(|&&id| id > 0).count() > 10_000);
     }
 }
