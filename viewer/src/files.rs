@@ -60,9 +60,12 @@ impl Viewer {
 
     /// Takes over what was dropped on the window, read, written, or changed on disk.
     pub(crate) fn take_files(&mut self, ctx: &Context) {
-        let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_owned()));
-        if let Some(path) = dropped {
-            self.open(&path.to_string_lossy(), ctx);
+        let dropped: Vec<_> =
+            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
+        match &dropped[..] {
+            [] => {}
+            [path] => self.open(&path.to_string_lossy(), ctx),
+            several => self.message = format!("{} files were dropped: drop one at a time", several.len()),
         }
         if self.watch.as_ref().is_some_and(Watch::take) && self.saving.is_none() {
             self.reload(ctx);

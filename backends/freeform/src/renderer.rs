@@ -227,15 +227,7 @@ pub(crate) fn converted(object: &Object, bound: f64, why: &str) -> Decision {
 /// Weakens a decision by what this back end leaves out of a material.
 pub(crate) fn with_material(scene: &Scene, object: &Object, decision: Decision) -> Decision {
     let mirror = (0..object.materials.len()).any(|slot| scene.material(object, slot).reflectivity > 0.0);
-    match decision {
-        Decision::Exact if mirror => {
-            Decision::Approximated { why: "mirror reflections are not drawn".to_owned() }
-        }
-        Decision::Converted { why, .. } if mirror => {
-            Decision::Approximated { why: format!("{why}; mirror reflections are not drawn") }
-        }
-        other => other,
-    }
+    if mirror { decision.weakened("mirror reflections are not drawn") } else { decision }
 }
 
 impl Renderer for Freeform {

@@ -114,18 +114,6 @@ pub(crate) fn decision(
     }
 }
 
-/// Adds a loss to a decision.
-pub(crate) fn with_loss(decision: &Decision, loss: &str) -> Decision {
-    match decision {
-        Decision::Skipped { .. } => decision.clone(),
-        Decision::Exact => Decision::Approximated { why: loss.to_owned() },
-        Decision::Approximated { why } => Decision::Approximated { why: format!("{why}; {loss}") },
-        Decision::Converted { bound, why } => {
-            Decision::Approximated { why: format!("{loss}; {why}, at most {bound:.2e} m off") }
-        }
-    }
-}
-
 /// Tells whether a camera's picture is put together from faces.
 pub(crate) fn is_resampled(projection: &Projection) -> bool {
     !matches!(projection, Projection::Perspective { .. } | Projection::Orthographic { .. })

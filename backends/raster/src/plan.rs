@@ -1,8 +1,6 @@
 //! What would be built for a need, and what would that cost?
 
-use crate::decide::{
-    RESAMPLED, decision, demand, detail, is_resampled, losses, losses_of_all, why_skipped, with_loss,
-};
+use crate::decide::{RESAMPLED, decision, demand, detail, is_resampled, losses, losses_of_all, why_skipped};
 use crate::info::Options;
 use crate::light::Lamp;
 use crate::shadow::{MapSizes, Shadows};
@@ -59,7 +57,7 @@ pub(crate) fn plan(scene: &Scene, need: &Need, options: Options) -> Plan {
                 plan.bytes = 0;
             }
             for loss in of_all.iter().copied().chain(bends.then_some(RESAMPLED)) {
-                plan.decision = with_loss(&plan.decision, loss);
+                plan.decision = plan.decision.weakened(loss);
             }
             plan
         })

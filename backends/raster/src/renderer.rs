@@ -202,7 +202,7 @@ impl Renderer for Raster {
         sizes.choose_tiers(&mut lamps, options.tier, scene, need);
         let mut decisions = given.to_vec();
         for loss in decide::losses_of_all(scene, &lamps, options, sizes) {
-            decisions.iter_mut().for_each(|d| *d = decide::with_loss(d, loss));
+            decisions.iter_mut().for_each(|d| *d = d.weakened(loss));
         }
         let kept = before.as_ref().filter(|b| Arc::ptr_eq(&b.model, &model)).and_then(|b| b.lines.clone());
         let lines = options.mode.draws_lines().then(|| kept.unwrap_or_else(|| Arc::new(Lines::of(&model))));
@@ -220,7 +220,7 @@ impl Renderer for Raster {
             resting_shadows: None,
             sizes,
             options,
-            decisions_resampled: decisions.iter().map(|d| decide::with_loss(d, RESAMPLED)).collect(),
+            decisions_resampled: decisions.iter().map(|d| d.weakened(RESAMPLED)).collect(),
             decisions: decisions.into(),
             as_drawn: OnceLock::new(),
         };

@@ -3,7 +3,9 @@
 //! Corners are told apart by their places: a mesh with sharp edges or seams in its texture has several vertices at
 //! one corner. Found once for each mesh and kept as long as it is drawn.
 
+use crate::crossings;
 use glam::Vec3;
+use polyptych_core::parallel::Threads;
 use polyptych_core::scene::Mesh;
 use std::collections::HashMap;
 
@@ -25,6 +27,8 @@ pub(crate) struct Edge {
     pub(crate) parts_materials: bool,
     /// Whether more than two faces meet here.
     pub(crate) is_crowded: bool,
+    /// Whether the faces have no edge in common, but pass through each other here.
+    pub(crate) crosses: bool,
 }
 
 /// The edges of a mesh.
@@ -37,11 +41,31 @@ pub(crate) struct Edges {
     pub(crate) places: Vec<Vec3>,
     /// Whether every edge has two faces that wind alike, so that no face is ever seen from behind from outside.
     pub(crate) is_closed: bool,
+    /// Whether it was looked for where the mesh crosses itself.
+    pub(crate) crossed: Crossed,
+}
+
+/// Where faces pass through each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Crossed {
+    /// Nobody has looked.
+    #[default]
+    Unknown,
+    /// Is among the edges.
+    Found,
+    /// Is left out: they do so too often.
+    TooOften,
 }
 
 impl Edges {
     /// Finds the edges of a mesh. Triangles without area have none.
+    #[cfg(test)]
     pub(crate) fn of(mesh: &Mesh) -> Self {
+        Self::new(mesh, None)
+    }
+
+    /// Finds the edges of a mesh, and with threads to do it on where it crosses itself.
+    pub(crate) fn new(mesh: &Mesh, threads: Option<&dyn Threads>) -> Self {
         let mut places = Vec::new();
         let mut known: HashMap<[u32; 3], u32, Mixed> =
             HashMap::with_capacity_and_hasher(mesh.positions.len(), Mixed::default());
@@ -59,6 +83,7 @@ impl Edges {
         let mut all = Self { places, is_closed: true, ..Self::default() };
         let mut halves = Vec::with_capacity(mesh.triangles.len() * 3);
         let mut slots = Vec::with_capacity(mesh.triangles.len());
+        let mut faces = Vec::new();
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             let corners = triangle.map(|i| corner_of[i as usize]);
             let [a, b, c] = corners.map(|i| all.places[i as usize].as_dvec3());
@@ -67,6 +92,9 @@ impl Edges {
             let n = normal.as_vec3();
             all.planes.push([n.x, n.y, n.z, normal.dot(a) as f32]);
             slots.push(mesh.slot(t) as u16);
+            if threads.is_some() {
+                faces.push(corners);
+            }
             for i in 0..3 {
                 let (from, to) = (corners[i], corners[(i + 1) % 3]);
                 let (low, high) = (from.min(to), from.max(to));
@@ -78,7 +106,32 @@ impl Edges {
             all.add(same, &slots);
         }
         all.is_closed &= !all.planes.is_empty();
+        if let Some(threads) = threads {
+            all.cross(&faces, threads);
+        }
         all
+    }
+
+    /// Adds where the faces of these corners cross.
+    fn cross(&mut self, faces: &[[u32; 3]], threads: &dyn Threads) {
+        let Some(crossings) = crossings::find(&self.places, faces, threads) else {
+            self.crossed = Crossed::TooOften;
+            return;
+        };
+        self.crossed = Crossed::Found;
+        for crossing in crossings {
+            let first = self.places.len() as u32;
+            self.places.extend(crossing.ends);
+            self.edges.push(Edge {
+                ends: [first, first + 1],
+                faces: crossing.faces,
+                cosine: -1.0,
+                is_turned: false,
+                parts_materials: false,
+                is_crowded: false,
+                crosses: true,
+            });
+        }
     }
 
     fn add(&mut self, same: &[(u64, u32)], slots: &[u16]) {
@@ -95,6 +148,7 @@ impl Edges {
                 is_turned: false,
                 parts_materials: false,
                 is_crowded,
+                crosses: false,
             });
             return;
         }
@@ -108,7 +162,15 @@ impl Edges {
             let is_turned = pair[0].1 & 1 == pair[1].1 & 1;
             let cosine = if is_turned { -a.dot(b) } else { a.dot(b) };
             let parts_materials = slots[faces[0] as usize] != slots[faces[1] as usize];
-            self.edges.push(Edge { ends, faces, cosine, is_turned, parts_materials, is_crowded });
+            self.edges.push(Edge {
+                ends,
+                faces,
+                cosine,
+                is_turned,
+                parts_materials,
+                is_crowded,
+                crosses: false,
+            });
         }
     }
 

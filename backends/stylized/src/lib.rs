@@ -33,6 +33,7 @@
 
 mod bake;
 mod cracks;
+mod crossings;
 mod edges;
 mod eight;
 mod frame;

@@ -184,6 +184,9 @@ impl Piece {
 fn kind_of(edge: &crate::edges::Edge, turns: bool, style: &Style) -> Option<Kind> {
     let is_drawn = |kind: Kind| style.pen(kind).is_drawn;
     let is_fold = edge.is_crowded || edge.cosine < style.crease_cosine;
+    if edge.crosses {
+        return is_drawn(Kind::Intersection).then_some(Kind::Intersection);
+    }
     if turns && is_drawn(Kind::Silhouette) {
         Some(Kind::Silhouette)
     } else if edge.faces[1] == NO_FACE && is_drawn(Kind::Border) {

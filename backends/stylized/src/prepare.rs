@@ -1,7 +1,7 @@
 //! What is built of a scene before it is drawn in a style: edges of its meshes, and meshes that carry their texture
 //! coordinates in their colors?
 
-use crate::edges::Edges;
+use crate::edges::{Crossed, Edges};
 use crate::hatch::Sticks;
 use crate::look::Look;
 use crate::outline::Body;
@@ -72,6 +72,7 @@ impl Outlines {
         if !styles.draw_lines() {
             return Ok(());
         }
+        let crossings = styles.draw(Kind::Intersection);
         let mut found: HashMap<usize, usize> = HashMap::new();
         for (index, object) in scene.objects.iter().enumerate() {
             control.check()?;
@@ -85,10 +86,11 @@ impl Outlines {
                 Source::Converted(model) => Arc::as_ptr(model) as usize,
             };
             let at = *found.entry(key).or_insert_with(|| {
-                let same = before.iter().find(|(old, _)| old.is(&source));
+                let serves = |edges: &Edges| !crossings || edges.crossed != Crossed::Unknown;
+                let same = before.iter().find(|(old, edges)| old.is(&source) && serves(edges));
                 let edges = match (same, source.mesh()) {
                     (Some((_, edges)), _) => edges.clone(),
-                    (None, Some(mesh)) => Arc::new(Edges::of(mesh)),
+                    (None, Some(mesh)) => Arc::new(Edges::new(mesh, crossings.then_some(control.threads))),
                     (None, None) => Arc::default(),
                 };
                 self.kept.push((source, edges));
@@ -103,6 +105,12 @@ impl Outlines {
             });
         }
         Ok(())
+    }
+
+    /// Lists the objects that cross themselves too often to find where.
+    pub(crate) fn tangled(&self) -> impl Iterator<Item = usize> {
+        let is_tangled = |body: &&Body| body.edges.crossed == Crossed::TooOften;
+        self.bodies.iter().filter(is_tangled).map(|body| body.object as usize)
     }
 
     pub(crate) fn bytes(&self) -> u64 {

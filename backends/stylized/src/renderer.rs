@@ -200,6 +200,11 @@ impl Renderer for Stylized {
         let seen = self.coded.prepare(scene, &styles, draws_meshes);
         let mut prepared = inner.prepare(&seen, &inner_need, converter, control)?;
         self.outlines.prepare(scene, &prepared.objects, &styles, need, converter, control)?;
+        let mut objects = prepared.objects.to_vec();
+        for object in self.outlines.tangled() {
+            objects[object] = objects[object].weakened("it crosses itself too often to draw lines there");
+        }
+        prepared.objects = objects.into();
         self.scratch.looks = looks(scene, &self.coded.objects);
         let colorful = colorful(scene, &styles);
         let bounds = scene.bounds();

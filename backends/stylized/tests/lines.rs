@@ -341,6 +341,33 @@ fn lines_toggle_no_more_pixels_than_those_of_an_antialiased_reference() {
 }
 
 #[test]
+fn a_mesh_that_crosses_itself_has_the_lines_of_two_that_cross() {
+    let parts = [(cube(1.0), Vec3::ZERO), (cube(0.9), Vec3::new(0.4, 0.35, 0.45))];
+    let one = scene(vec![(Shape::Mesh(joined(&parts)), DVec3::ZERO)], DVec3::Y);
+    let [a, b] = parts.map(|(mesh, at)| (Shape::Mesh(mesh), at.as_dvec3()));
+    let two = scene(vec![a, b], DVec3::Y);
+    let lengths = |strokes: Vec<Stroke>| {
+        let crossings: f32 = strokes.iter().filter(|s| s.kind == Kind::Intersection).map(length).sum();
+        (crossings, strokes.iter().map(length).sum::<f32>())
+    };
+    let (mut of_one, mut of_two) = ([0.0f32; 2], [0.0f32; 2]);
+    for i in 0..16 {
+        let camera = central(direction(i, 16) * 4.0, 0.7);
+        for (scene, sums) in [(&one, &mut of_one), (&two, &mut of_two)] {
+            let (crossings, all) = lengths(Easel::new(scene, camera.clone(), [SIZE; 2], &LINES).strokes());
+            (sums[0], sums[1]) = (sums[0] + crossings, sums[1] + all);
+        }
+        // Its own are exact: each place lies on both bodies, which only the eye may not see.
+        let without = [&LINES[..], &[("intersection", "false")]].concat();
+        let strokes = Easel::new(&one, camera, [SIZE; 2], &without).strokes();
+        assert!(strokes.iter().all(|s| s.kind != Kind::Intersection));
+    }
+    // Those of two bodies are found pixel by pixel, and go around corners.
+    assert!(of_one[0] > 500.0 && (of_one[0] / of_two[0] - 1.0).abs() < 0.1, "{of_one:?} {of_two:?}");
+    assert!((of_one[1] / of_two[1] - 1.0).abs() < 0.05, "{of_one:?} {of_two:?}");
+}
+
+#[test]
 fn vectors_are_written_as_closed_paths_with_their_objects() {
     let mut scene = (*scene(vec![(Shape::Mesh(ball(1.0, 16, true)), DVec3::ZERO)], DVec3::Y)).clone();
     scene.objects[0].name = "a <ball> & more".to_owned();

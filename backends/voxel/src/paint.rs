@@ -172,26 +172,25 @@ impl<'a> Painter<'a> {
         }
     }
 
-    polyptych_core::for_registers! {
-        /// Draws a band tile by tile; false where the host stopped it.
-        pub(crate) fn paint(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool
-            = paint_tiles_512, paint_tiles_256, paint_tiles;
-    }
-
-    #[inline(always)]
-    fn paint_tiles(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
+    /// Draws a band tile by tile; false where the host stopped it.
+    pub(crate) fn paint(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, control: &Control<'_>) -> bool {
         for first_column in (0..band.width).step_by(TILE as usize) {
             if control.is_cancelled() {
                 return false;
             }
             let columns = TILE.min(band.width - first_column);
             let tile = Tile { first_column, columns, first_row: band.first_row, rows: band.rows };
-            self.draw(tracer, band, tile);
+            self.draw_tile(tracer, band, tile);
             if self.samples > 1 {
                 self.smooth(tracer, band, tile);
             }
         }
         true
+    }
+
+    polyptych_core::for_registers! {
+        /// Draws a tile.
+        fn draw_tile(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) = draw_512, draw_256, draw;
     }
 
     #[inline(always)]
@@ -205,7 +204,6 @@ impl<'a> Painter<'a> {
 
     /// Puts the mean of many rays in the place of a tile's colors, and of its coverage. They go through places that a
     /// golden section spreads evenly over the pixel, the same in each, so that nothing flickers.
-    #[inline(always)]
     fn smooth(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let (mut colors, mut covers) = ([Vec3::ZERO; TILE_RAYS], [0.0f32; TILE_RAYS]);
@@ -231,7 +229,7 @@ impl<'a> Painter<'a> {
                 shadow: &mut [],
                 coverage: &mut cover,
             };
-            sampler.draw_sample(tracer, &mut sample, part);
+            sampler.draw_tile(tracer, &mut sample, part);
             for (sum, sample) in colors.iter_mut().zip(color) {
                 *sum += sample;
             }
@@ -249,12 +247,6 @@ impl<'a> Painter<'a> {
                 *coverage = covers[i] * share;
             }
         }
-    }
-
-    polyptych_core::for_registers! {
-        /// Draws a tile in a function of its own: the kernel is large, and need not be there twice.
-        #[inline(never)]
-        fn draw_sample(&self, tracer: &Tracer<'_>, band: &mut Band<'_>, tile: Tile) = draw_512, draw_256, draw;
     }
 
     /// Sets up the rays of all pixels of a tile.

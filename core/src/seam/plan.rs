@@ -39,6 +39,18 @@ impl Decision {
         }
     }
 
+    /// Adds that something is left out or simplified.
+    #[must_use]
+    pub fn weakened(&self, loss: &str) -> Self {
+        let why = match self {
+            Self::Skipped { .. } => return self.clone(),
+            Self::Exact => loss.to_owned(),
+            Self::Approximated { why } => format!("{why}; {loss}"),
+            Self::Converted { bound, why } => format!("{loss}; {why}, at most {bound:.2e} m off"),
+        };
+        Self::Approximated { why }
+    }
+
     /// Returns the reason, empty for exact objects.
     #[must_use]
     pub fn why(&self) -> &str {

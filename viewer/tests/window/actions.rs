@@ -3,8 +3,9 @@
 use crate::harness::{press, rest, window};
 use eframe::egui::accesskit::Role;
 use eframe::egui::{Key, Modifiers, Vec2};
+use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use polyptych_viewer::{ACTIONS, Action, Mode};
+use polyptych_viewer::{ACTIONS, Action, Mode, Viewer};
 
 #[test]
 fn every_action_of_the_palette_runs_once() {
@@ -84,8 +85,8 @@ fn the_first_screen_says_how_and_goes() {
     assert!(harness.query_by_label_contains("Drop a model onto this window").is_none());
 }
 
-#[test]
-fn every_control_has_a_name_for_screen_readers() {
+/// A window with all panels open.
+fn full() -> Harness<'static, Viewer> {
     let mut harness = window("quadrics");
     let ctx = harness.ctx.clone();
     harness.set_size(Vec2::new(1200.0, 1600.0));
@@ -101,21 +102,30 @@ fn every_control_has_a_name_for_screen_readers() {
         harness.state_mut().perform(action, &ctx);
     }
     rest(&mut harness);
+    harness
+}
+
+fn is_control(role: Role) -> bool {
+    matches!(
+        role,
+        Role::Button
+            | Role::CheckBox
+            | Role::ComboBox
+            | Role::SpinButton
+            | Role::Slider
+            | Role::TextInput
+            | Role::ColorWell
+    )
+}
+
+#[test]
+fn every_control_has_a_name_for_screen_readers() {
+    let harness = full();
     let mut count = 0;
     let mut nameless = Vec::new();
     for node in harness.root().children_recursive() {
         let node = node.accesskit_node();
-        let is_control = matches!(
-            node.role(),
-            Role::Button
-                | Role::CheckBox
-                | Role::ComboBox
-                | Role::SpinButton
-                | Role::Slider
-                | Role::TextInput
-                | Role::ColorWell
-        );
-        if is_control {
+        if is_control(node.role()) {
             count += 1;
             if node.label().is_none_or(|label| label.trim().is_empty()) {
                 nameless.push(format!("{:?} {:?}", node.role(), node.value()));
@@ -124,4 +134,28 @@ fn every_control_has_a_name_for_screen_readers() {
     }
     assert!(count > 60, "{count} controls");
     assert_eq!(nameless, [""; 0], "of {count}");
+}
+
+#[test]
+fn tab_reaches_every_control() {
+    let mut harness = full();
+    let controls = |harness: &Harness<'_, Viewer>| {
+        let nodes = harness.root().children_recursive().collect::<Vec<_>>();
+        let of = |node: &egui_kittest::Node<'_>| {
+            let (rect, node) = (node.rect(), node.accesskit_node());
+            let name = format!("{:?} {:?} at {:?}", node.role(), node.label(), rect.center().round());
+            (is_control(node.role()) && !node.is_disabled()).then_some((name, node.is_focused(), rect))
+        };
+        nodes.iter().filter_map(of).collect::<Vec<_>>()
+    };
+    let mut waits: Vec<String> = controls(&harness).into_iter().map(|(name, ..)| name).collect();
+    let count = waits.len();
+    assert!(count > 60, "{count} controls");
+    for _ in 0..count * 2 {
+        harness.key_press(Key::Tab);
+        harness.run_steps(2);
+        let focused: Vec<_> = controls(&harness).into_iter().filter(|(_, focused, _)| *focused).collect();
+        waits.retain(|name| focused.iter().all(|(at, ..)| at != name));
+    }
+    assert_eq!(waits, [""; 0], "of {count} are never reached");
 }

@@ -70,6 +70,55 @@ fn what_cannot_be_opened_is_said_and_nothing_is_lost() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
+/// A file that somebody let go over the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl eframe::egui::DroppedFile for Dropped {
+    fn path(&self) -> &std::path::Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn what_is_dropped_is_opened() {
+    let folder = folder("drop");
+    let (roof, floor, broken) =
+        (folder.join("roof.obj"), folder.join("floor.ply"), folder.join("broken.stl"));
+    std::fs::write(&roof, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+               0 0 0\n1 0 0\n0 0 1\n3 0 1 2\n";
+    std::fs::write(&floor, ply).unwrap();
+    std::fs::write(&broken, "solid of nothing that can be read").unwrap();
+    let mut harness = window("polyhedra");
+    let drop = |harness: &mut egui_kittest::Harness<'_, Viewer>, files: &[&PathBuf]| {
+        let files = files.iter().map(|file| {
+            let file: std::sync::Arc<dyn eframe::egui::DroppedFile + Send + Sync> =
+                std::sync::Arc::new(Dropped((*file).clone()));
+            file
+        });
+        harness.input_mut().dropped_files = files.collect();
+        harness.step();
+        rest(harness);
+    };
+    for (file, name) in [(&roof, "roof"), (&floor, "floor")] {
+        drop(&mut harness, &[file]);
+        assert_eq!(harness.state().scene().name, name, "{}", harness.state().message());
+    }
+    drop(&mut harness, &[&broken]);
+    assert_eq!(harness.state().scene().name, "floor");
+    assert!(harness.state().message().contains("broken.stl"), "{}", harness.state().message());
+    drop(&mut harness, &[&roof, &floor]);
+    assert_eq!(harness.state().scene().name, "floor");
+    assert_eq!(harness.state().message(), "2 files were dropped: drop one at a time");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
 fn kept(folder: &std::path::Path) -> Viewer {
     let scene = polyptych::builtin::scene("polyhedra").unwrap();
     let mut viewer = Viewer::new(Registry::builtin(), scene).unwrap();

@@ -2,12 +2,13 @@
 
 use crate::harness::{colors, drag, press, rest, window};
 use eframe::egui::accesskit::Role;
-use eframe::egui::{Key, Pos2, Vec2};
+use eframe::egui::{Event, Key, Modifiers, Pos2, TouchDeviceId, TouchId, TouchPhase, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use polyptych::BuiltinBackends;
 use polyptych::seam::Registry;
 use polyptych_viewer::{Action, Mode, Viewer};
+use std::path::Path;
 
 #[test]
 fn two_back_ends_stand_side_by_side_at_once() {
@@ -44,6 +45,47 @@ fn dragging_turns_the_camera_of_all_panes() {
     let turned = harness.state().camera().eye;
     assert!(turned.distance(eye) > 0.1, "{eye} {turned}");
     assert_ne!(before, harness.state().picture(1).unwrap().0, "the pane beside it turned, too");
+}
+
+#[test]
+fn two_fingers_zoom_turn_and_shift() {
+    let mut harness = window("polyhedra");
+    // Where two fingers are, and what that does: eye and up before and after.
+    let mut gesture = |from: [[f32; 2]; 2], to: [[f32; 2]; 2]| {
+        let touch = |finger: u64, phase: TouchPhase, [x, y]: [f32; 2]| Event::Touch {
+            device_id: TouchDeviceId(7),
+            id: TouchId(finger),
+            phase,
+            pos: Pos2::new(x, y),
+            force: None,
+        };
+        let all = |phase, places: [[f32; 2]; 2]| {
+            [(); 2].iter().enumerate().map(|(i, ())| touch(i as u64, phase, places[i])).collect::<Vec<_>>()
+        };
+        let before = harness.state().camera().clone();
+        harness.event(Event::PointerMoved(Pos2::new(160.0, 200.0)));
+        harness.step();
+        let steps = [0.0f32, 0.25, 0.5, 0.75, 1.0];
+        for (i, share) in steps.into_iter().enumerate() {
+            let place =
+                |finger: usize| [0, 1].map(|k| from[finger][k] + (to[finger][k] - from[finger][k]) * share);
+            let phase = if i == 0 { TouchPhase::Start } else { TouchPhase::Move };
+            harness.input_mut().events.extend(all(phase, [place(0), place(1)]));
+            harness.step();
+        }
+        harness.input_mut().events.extend(all(TouchPhase::End, to));
+        rest(&mut harness);
+        (before, harness.state().camera().clone())
+    };
+    let distance = |camera: &polyptych::camera::Camera| camera.eye.length();
+    let (before, after) = gesture([[140.0, 200.0], [180.0, 200.0]], [[100.0, 200.0], [220.0, 200.0]]);
+    assert!(distance(&after) < distance(&before) * 0.6, "fingers apart: nearer");
+    let (before, after) = gesture([[100.0, 200.0], [220.0, 200.0]], [[160.0, 140.0], [160.0, 260.0]]);
+    let turned = before.up().angle_between(after.up());
+    assert!((turned - std::f64::consts::FRAC_PI_2).abs() < 0.2, "fingers around each other: {turned}");
+    let (before, after) = gesture([[140.0, 200.0], [180.0, 200.0]], [[180.0, 230.0], [220.0, 230.0]]);
+    assert!(before.eye.distance(after.eye) > 0.05, "both to the side: shifted");
+    assert!(before.forward().distance(after.forward()) < 1e-6, "but not turned");
 }
 
 #[test]
@@ -167,6 +209,46 @@ fn choosing_a_style_shows_its_numbers() {
     let steps = style.settings["tone.steps"].to_string();
     let field = harness.get_by_role_and_label(Role::SpinButton, "tone.steps");
     assert_eq!(field.accesskit_node().numeric_value().map(|n| n.to_string()), Some(steps));
+}
+
+#[test]
+fn a_style_is_saved_and_used_again() {
+    let folder = std::env::temp_dir().join(format!("polyptych-viewer-style-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("mine.ron").to_string_lossy().into_owned();
+    let mut harness = window("polyhedra");
+    drag(&mut harness, Pos2::new(100.0, 200.0), Pos2::new(100.0, 200.0));
+    press(&mut harness, Key::Num5);
+    press(&mut harness, Key::I);
+    harness.set_size(Vec2::new(640.0, 1500.0));
+    rest(&mut harness);
+    harness.get_by_label("blueprint").click();
+    rest(&mut harness);
+    let blueprint = harness.state().picture(0).unwrap().0.to_vec();
+    let write = |harness: &mut Harness<'_, Viewer>, text: &str| {
+        let field = harness.get_by_role_and_label(Role::TextInput, "file");
+        field.focus();
+        harness.run_steps(2);
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        harness.event(Event::Text(text.to_owned()));
+        rest(harness);
+    };
+    write(&mut harness, "mine.txt");
+    harness.get_by_label("Save style").click();
+    rest(&mut harness);
+    assert!(harness.query_by_label_contains("styles are written as .ron").is_some(), "refused at the field");
+    write(&mut harness, &file);
+    harness.get_by_label("Save style").click();
+    rest(&mut harness);
+    let style = polyptych::stylized::Preset::load(Path::new(&file)).unwrap();
+    assert_eq!(style.settings, polyptych::stylized::Preset::builtin("blueprint").unwrap().settings);
+    harness.get_by_label("toon").click();
+    rest(&mut harness);
+    assert_ne!(harness.state().picture(0).unwrap().0, blueprint);
+    harness.get_by_label("Use").click();
+    rest(&mut harness);
+    assert_eq!(harness.state().picture(0).unwrap().0, blueprint, "the style of the file");
+    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
