@@ -48,7 +48,8 @@ pub(crate) fn show(ui: &mut egui::Ui, info: &BackendInfo, settings: &mut Setting
     });
     let place = ui.scope_id().with("style file");
     let mut path = ui.data(|d| d.get_temp::<String>(place)).unwrap_or_else(|| "my_style.ron".to_owned());
-    ui.horizontal(|ui| {
+    // What is refused goes on in the next line: the panel stays as wide as it is.
+    ui.horizontal_wrapped(|ui| {
         let label = ui.label("file").id;
         ui.add(egui::TextEdit::singleline(&mut path).desired_width(120.0)).labelled_by(label);
         let saved = ui.button("Save style").clicked().then(|| save(settings, &path));

@@ -234,7 +234,7 @@ mod tests {
         mesh.positions.extend([Vec3::ZERO, Vec3::X * width, Vec3::new(0.0, 0.0, 1e3)]);
         mesh.triangles.push([0, 1, 2]);
         for i in 0..blades {
-            let at = Vec3::new((i * 1777 % blades) as f32, 0.0, 1.0);
+            let at = Vec3::new((i * 1777 % blades) as f32 + 0.5, 0.0, 1.0);
             let first = mesh.positions.len() as u32;
             mesh.positions.extend([
                 at - Vec3::Y,

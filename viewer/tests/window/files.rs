@@ -88,13 +88,13 @@ impl eframe::egui::DroppedFile for Dropped {
 fn what_is_dropped_is_opened() {
     let folder = folder("drop");
     let (roof, floor, broken) =
-        (folder.join("roof.obj"), folder.join("floor.ply"), folder.join("broken.stl"));
+        (folder.join("roof.obj"), folder.join("floor.ply"), folder.join("broken.glb"));
     std::fs::write(&roof, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
                element face 1\nproperty list uchar int vertex_indices\nend_header\n\
                0 0 0\n1 0 0\n0 0 1\n3 0 1 2\n";
     std::fs::write(&floor, ply).unwrap();
-    std::fs::write(&broken, "solid of nothing that can be read").unwrap();
+    std::fs::write(&broken, b"glTF but not really").unwrap();
     let mut harness = window("polyhedra");
     let drop = |harness: &mut egui_kittest::Harness<'_, Viewer>, files: &[&PathBuf]| {
         let files = files.iter().map(|file| {
@@ -112,7 +112,7 @@ fn what_is_dropped_is_opened() {
     }
     drop(&mut harness, &[&broken]);
     assert_eq!(harness.state().scene().name, "floor");
-    assert!(harness.state().message().contains("broken.stl"), "{}", harness.state().message());
+    assert!(harness.state().message().contains("broken.glb"), "{}", harness.state().message());
     drop(&mut harness, &[&roof, &floor]);
     assert_eq!(harness.state().scene().name, "floor");
     assert_eq!(harness.state().message(), "2 files were dropped: drop one at a time");
