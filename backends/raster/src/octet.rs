@@ -123,13 +123,16 @@ impl Octet {
         let outside = a + (b - a).scaled(v.round()) + (c - a).scaled(w.round());
         let flipped = F32x8::ZERO - F32x8::splat(1.0);
         let shading = outside.scaled(from_within.pick(flipped, F32x8::splat(1.0)));
-        let changes = with_changes.then(|| {
-            let [right, down] = lens.steps().map(DVec3x8::splat);
-            let steps = |of: DVec3x8| [of.dot(right), of.dot(down)];
+        let changes = if with_changes {
+            let [right, down] = lens.steps();
+            let (right, down) = (DVec3x8::splat(right), DVec3x8::splat(down));
             let [v, w] = to_weights;
             let slopes = (slope, [direction.dot(v), direction.dot(w)]);
-            changes_all(lens, t, slopes, (steps(normal), [steps(v), steps(w)]))
-        });
+            let steps_of_weights = [[v.dot(right), v.dot(down)], [w.dot(right), w.dot(down)]];
+            Some(changes_all(lens, t, slopes, ([normal.dot(right), normal.dot(down)], steps_of_weights)))
+        } else {
+            None
+        };
         OctetMet { t, weights: [v, w], inside, true_normal, normal: shading, changes }
     }
 }
