@@ -24,7 +24,7 @@ const MARGIN: f64 = 1.0 / 64.0;
 pub(crate) struct Ranges {
     words: Vec<u32>,
     /// Where each level begins, and how many blocks it has along x and z. Level 0, the cells, has none.
-    levels: [Level; LEVELS],
+    levels: Box<[Level; LEVELS]>,
     top: usize,
     lowest: f64,
     /// Steps in a unit of height.
@@ -43,7 +43,8 @@ impl Ranges {
         let bounds = field.bounds();
         let (lowest, size) = (bounds.min.y, bounds.max.y - bounds.min.y);
         let steps = if size > 0.0 { STEPS / size } else { 1.0 };
-        let mut all = Self { words: Vec::new(), levels: [Level::default(); LEVELS], top: 0, lowest, steps };
+        let mut all =
+            Self { words: Vec::new(), levels: Box::new([Level::default(); LEVELS]), top: 0, lowest, steps };
         all.words.reserve_exact(planned(field) as usize);
         all.add_cells(field);
         while all.levels[all.top].columns * all.levels[all.top].rows > 1 {

@@ -7,7 +7,7 @@
 
 use crate::height_ranges::Ranges;
 use glam::DVec2;
-use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, I32x8, LANES, Mask8};
 use polyptych_core::scene::HeightField;
 
 /// Level at which rays begin to walk.
@@ -184,17 +184,17 @@ impl GridRays {
     #[inline(always)]
     fn patches(&self, field: &HeightField, [x, z]: [I32x8; 2], near: F64x8, far: F64x8) -> Patches {
         let (heights, columns) = (field.heights(), field.columns() as usize);
-        let mut corners = [[0.0; LANES]; 4];
+        let mut corners = [F32x8::ZERO; 4];
         for i in 0..LANES {
             let first = z.0[i] as u32 as usize * columns + x.0[i] as u32 as usize;
             if let Some(part) = heights.get(first..first + columns + 2) {
-                corners[0][i] = part[0];
-                corners[1][i] = part[1];
-                corners[2][i] = part[columns];
-                corners[3][i] = part[columns + 1];
+                corners[0].0[i] = part[0];
+                corners[1].0[i] = part[1];
+                corners[2].0[i] = part[columns];
+                corners[3].0[i] = part[columns + 1];
             }
         }
-        let [h00, h10, h01, h11] = corners.map(|h| polyptych_core::lanes::F32x8(h).to_f64());
+        let [h00, h10, h01, h11] = corners.map(F32x8::to_f64);
         // Around the entry the numbers are small. f(s) = y - h over u = u0 + du s, v = v0 + dv s.
         let (u, v) = (
             self.x.start + self.x.slope * near - x.to_f64(),
