@@ -23,9 +23,12 @@ const MARGIN: f64 = 1.0 / 64.0;
 #[derive(Debug)]
 pub(crate) struct Ranges {
     words: Vec<u32>,
-    /// Where each level begins, and how many blocks it has along x and z. Level 0, the cells, has none.
+    /// Where each level begins, and how many blocks it has along x. Level 0, the cells, has none.
     levels: Box<[Level; LEVELS]>,
     top: usize,
+    /// The field's cells along x and z.
+    columns: u32,
+    rows: u32,
     lowest: f64,
     /// Steps in a unit of height.
     steps: f64,
@@ -35,7 +38,6 @@ pub(crate) struct Ranges {
 struct Level {
     first: u32,
     columns: u32,
-    rows: u32,
 }
 
 impl Ranges {
@@ -43,11 +45,18 @@ impl Ranges {
         let bounds = field.bounds();
         let (lowest, size) = (bounds.min.y, bounds.max.y - bounds.min.y);
         let steps = if size > 0.0 { STEPS / size } else { 1.0 };
-        let mut all =
-            Self { words: Vec::new(), levels: Box::new([Level::default(); LEVELS]), top: 0, lowest, steps };
+        let mut all = Self {
+            words: Vec::new(),
+            levels: Box::new([Level::default(); LEVELS]),
+            top: 0,
+            columns: field.columns() - 1,
+            rows: field.rows() - 1,
+            lowest,
+            steps,
+        };
         all.words.reserve_exact(planned(field) as usize);
         all.add_cells(field);
-        while all.levels[all.top].columns * all.levels[all.top].rows > 1 {
+        while all.size(all.top) != [1, 1] {
             all.add_level();
         }
         all
@@ -69,7 +78,7 @@ impl Ranges {
 
     /// Returns how many blocks a level has along x and z.
     pub(crate) fn size(&self, level: usize) -> [u32; 2] {
-        [self.levels[level].columns, self.levels[level].rows]
+        [self.columns, self.rows].map(|cells| cells.div_ceil(1 << level))
     }
 
     /// Returns how many steps there are in a unit of height, and at how many the height 0 is.
@@ -88,21 +97,21 @@ impl Ranges {
     #[inline(always)]
     pub(crate) fn words(&self, x: I32x8, z: I32x8, level: I32x8) -> I32x8 {
         let (across, along) = (x.down(level), z.down(level));
-        let mut words = [-0x1_0000; LANES];
+        let mut words = I32x8::splat(-0x1_0000);
         for i in 0..LANES {
             let Level { first, columns, .. } = self.levels[level.0[i] as usize % LEVELS];
             let at = first.wrapping_add((along.0[i] as u32).wrapping_mul(columns));
             if let Some(word) = self.words.get(at.wrapping_add(across.0[i] as u32) as usize) {
-                words[i] = *word as i32;
+                words.0[i] = *word as i32;
             }
         }
-        I32x8(words)
+        words
     }
 
     /// Adds the ranges of blocks of 2x2 cells: of up to 3x3 heights.
     fn add_cells(&mut self, field: &HeightField) {
         let [columns, rows] = [field.columns(), field.rows()].map(|n| (n - 1).div_ceil(2));
-        (self.top, self.levels[1]) = (1, Level { first: 0, columns, rows });
+        (self.top, self.levels[1]) = (1, Level { first: 0, columns });
         let (heights, wide) = (field.heights(), field.columns());
         for row in 0..rows {
             for column in 0..columns {
@@ -122,15 +131,15 @@ impl Ranges {
 
     /// Adds the ranges of blocks of 2x2 blocks of the last level.
     fn add_level(&mut self) {
-        let below = self.levels[self.top];
-        let (columns, rows) = (below.columns.div_ceil(2), below.rows.div_ceil(2));
+        let (below, [across, along]) = (self.levels[self.top], self.size(self.top));
         self.top += 1;
-        self.levels[self.top] = Level { first: self.words.len() as u32, columns, rows };
+        let [columns, rows] = self.size(self.top);
+        self.levels[self.top] = Level { first: self.words.len() as u32, columns };
         for row in 0..rows {
             for column in 0..columns {
                 let (mut low, mut high) = (0xFFFF, 0);
-                for y in row * 2..(row * 2 + 2).min(below.rows) {
-                    for x in column * 2..(column * 2 + 2).min(below.columns) {
+                for y in row * 2..(row * 2 + 2).min(along) {
+                    for x in column * 2..(column * 2 + 2).min(across) {
                         let word = self.words[(below.first + y * below.columns + x) as usize];
                         (low, high) = (low.min(word & 0xFFFF), high.max(word >> 16));
                     }

@@ -1,7 +1,7 @@
 //! Do rays meet height fields where they do when every cell under them is looked at, one by one?
 
 use crate::height_ranges::Ranges;
-use crate::height_walk::GridRays;
+use crate::height_walk::Walk;
 use glam::{DVec2, DVec3};
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 use polyptych_core::scene::HeightField;

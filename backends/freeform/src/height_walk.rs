@@ -13,13 +13,32 @@ use polyptych_core::scene::HeightField;
 /// Level at which rays begin to walk.
 const FIRST_LEVEL: i32 = 2;
 
-/// Eight rays over the grid: one unit a cell.
+/// Eight rays on their way over the grid, one unit a cell.
+///
+/// Kept in memory from step to step, numbers of one kind beside those of another: so each group of eight is told from the
+/// next by the compiler.
 #[derive(Clone, Copy)]
-pub(crate) struct GridRays {
+#[repr(C)]
+pub(crate) struct Walk {
+    cell_x: I32x8,
+    t: F64x8,
+    cell_z: I32x8,
+    /// Heights in the steps in which ranges are told.
+    y: F64x8,
+    level: I32x8,
+    far: F64x8,
+    /// Those that have met nothing yet.
+    pub(crate) open: Mask8,
+    height: F64x8,
+    met: Mask8,
+    rise: F64x8,
     x: Axis,
     z: Axis,
-    height: F64x8,
-    rise: F64x8,
+    /// Heights in units of the object.
+    true_height: F64x8,
+    true_rise: F64x8,
+    /// The patches on which the surface is met.
+    patches: Patches,
 }
 
 /// Eight rays along one axis of the grid.
@@ -86,6 +105,12 @@ impl Axis {
         Block { first, last: last.min(self.last), border, leave }
     }
 
+    /// Tells which cells are beyond the first or the last.
+    #[inline(always)]
+    fn is_beyond(&self, cell: I32x8) -> Mask8 {
+        (cell | (self.last - cell)).is_negative()
+    }
+
     /// Returns the cells behind borders.
     #[inline(always)]
     fn behind(&self, border: I32x8) -> I32x8 {
@@ -93,96 +118,110 @@ impl Axis {
     }
 }
 
-impl GridRays {
-    /// Turns rays in object space into those over the grid.
+impl Walk {
+    /// Sets out with open rays in object space, between two distances, unless there are none.
     #[inline(always)]
-    pub(crate) fn new(field: &HeightField, origin: &DVec3x8, direction: &DVec3x8) -> Self {
+    pub(crate) fn start(
+        field: &HeightField,
+        ranges: &Ranges,
+        (origin, direction): (&DVec3x8, &DVec3x8),
+        (near, far): (F64x8, F64x8),
+        open: Mask8,
+    ) -> Self {
         let one_over = field.cell_size().recip();
         let middle = DVec2::new(f64::from(field.columns() - 1), f64::from(field.rows() - 1)) * 0.5;
         let place = |v: F64x8, middle: f64, one_over: f64| v * F64x8::splat(one_over) + F64x8::splat(middle);
         let slope = |v: F64x8, one_over: f64| v * F64x8::splat(one_over);
         let x = (place(origin.x, middle.x, one_over.x), slope(direction.x, one_over.x));
         let z = (place(origin.z, middle.y, one_over.y), slope(direction.z, one_over.y));
-        Self {
-            x: Axis::new(x.0, x.1, field.columns() - 1),
-            z: Axis::new(z.0, z.1, field.rows() - 1),
-            height: origin.y,
-            rise: direction.y,
-        }
-    }
-
-    /// Finds the first distances between others at which open rays meet the surface, from above or from below.
-    #[inline(always)]
-    pub(crate) fn meet(
-        &self,
-        field: &HeightField,
-        ranges: &Ranges,
-        (near, far): (F64x8, F64x8),
-        open: Mask8,
-    ) -> (Mask8, F64x8) {
-        let (none, one) = (I32x8::splat(0), I32x8::splat(1));
-        let top = I32x8::splat(ranges.top() as i32);
-        // Heights in the steps in which ranges are told.
+        let x = Axis::new(x.0, x.1, field.columns() - 1);
+        let z = Axis::new(z.0, z.1, field.rows() - 1);
         let [steps, zero] = ranges.scale().map(F64x8::splat);
-        let (height, rise) = (self.height * steps + zero, self.rise * steps);
-        // What distances may be off by.
-        let hair = far * F64x8::splat(1e-14);
-        let (mut t, mut y, mut open) = (near, height + rise * near, open);
-        let (mut x, mut z) = (self.x.cell(t, none, self.x.last), self.z.cell(t, none, self.z.last));
-        let mut level = I32x8::splat(FIRST_LEVEL).min(top);
-        let (mut met, mut patches) = (Mask8::NONE, Patches::NONE);
-        while open.any() {
-            let others = one.up(level) - one;
-            let (across, along) = (self.x.block(x, others), self.z.block(z, others));
-            let turns = across.leave.above(along.leave);
-            let leave = across.leave.min(along.leave);
-            let exit = leave.min(far).max(t);
-            let after = height + rise * exit;
-            let words = ranges.words(x, z, level);
-            let (low, high) =
-                ((words & I32x8::splat(0xFFFF)).to_f64(), words.down(I32x8::splat(16)).to_f64());
-            let is_cell = level.equal(none);
-            let passes = y.min(after).above(high) | low.above(y.max(after));
-            let mut goes = open & (passes | is_cell);
-            let sinks = open & !goes;
-            let looks = open & is_cell;
-            if looks.any() {
-                let here = self.patches(field, [x, z], t, exit);
-                let mut on = looks & here.change_sides();
-                let doubtful = looks & !on & here.may_touch(hair);
-                if doubtful.any() {
-                    on = on | (doubtful & here.first(hair).0);
-                }
-                patches = Patches::pick(on, here, patches);
-                met = met | on;
-                open = open & !on;
-                goes = goes & !on;
-            }
-            // Across one border, and somewhere along it.
-            let next_x = I32x8::pick(
-                turns,
-                self.x.cell(exit, across.first, across.last),
-                self.x.behind(across.border),
-            );
-            let next_z =
-                I32x8::pick(turns, self.z.behind(along.border), self.z.cell(exit, along.first, along.last));
-            // Up, where another block of the level above is entered.
-            let moved = ((next_x ^ x) | (next_z ^ z)).down(level);
-            let rises = goes & one.below(moved) & level.below(top);
-            level = level + I32x8::pick(rises, one, none) - I32x8::pick(sinks, one, none);
-            x = I32x8::pick(goes, next_x, x);
-            z = I32x8::pick(goes, next_z, z);
-            t = F64x8::pick(goes, exit, t);
-            y = F64x8::pick(goes, after, y);
-            let outside = (x | z | (self.x.last - x) | (self.z.last - z)).is_negative();
-            open = open & !(goes & (outside | leave.at_least(far)));
+        let (height, rise) = (origin.y * steps + zero, direction.y * steps);
+        let none = I32x8::splat(0);
+        Self {
+            cell_x: x.cell(near, none, x.last),
+            t: near,
+            cell_z: z.cell(near, none, z.last),
+            y: height + rise * near,
+            level: I32x8::splat(FIRST_LEVEL.min(ranges.top() as i32)),
+            far,
+            open,
+            height,
+            rise,
+            x,
+            z,
+            true_height: origin.y,
+            true_rise: direction.y,
+            met: Mask8::NONE,
+            patches: Patches::NONE,
         }
-        (met, patches.first(hair).1)
     }
 
-    /// Returns the patches of cells along the rays between two distances.
+    /// Goes one step with all rays that are open.
     #[inline(always)]
-    fn patches(&self, field: &HeightField, [x, z]: [I32x8; 2], near: F64x8, far: F64x8) -> Patches {
+    pub(crate) fn step(&mut self, field: &HeightField, ranges: &Ranges) {
+        let (none, one) = (I32x8::splat(0), I32x8::splat(1));
+        let (t, level) = (self.t, self.level);
+        let others = one.up(level) - one;
+        let (across, along) = (self.x.block(self.cell_x, others), self.z.block(self.cell_z, others));
+        let turns = across.leave.above(along.leave);
+        let leave = across.leave.min(along.leave);
+        let exit = leave.min(self.far).max(t);
+        let after = self.height + self.rise * exit;
+        let words = ranges.words(self.cell_x, self.cell_z, level);
+        let (low, high) = ((words & I32x8::splat(0xFFFF)).to_f64(), words.down(I32x8::splat(16)).to_f64());
+        let is_cell = level.equal(none);
+        let passes = self.y.min(after).above(high) | low.above(self.y.max(after));
+        let mut goes = self.open & (passes | is_cell);
+        let sinks = self.open & !goes;
+        let looks = self.open & is_cell;
+        if looks.any() {
+            let here = self.here(field, exit);
+            let hair = self.hair();
+            let mut on = looks & here.change_sides();
+            let doubtful = looks & !on & here.may_touch(hair);
+            if doubtful.any() {
+                on = on | (doubtful & here.first(hair).0);
+            }
+            self.patches.take(on, &here);
+            self.met = self.met | on;
+            self.open = self.open & !on;
+            goes = goes & !on;
+        }
+        // Across one border, and somewhere along it.
+        let next_x =
+            I32x8::pick(turns, self.x.cell(exit, across.first, across.last), self.x.behind(across.border));
+        let next_z =
+            I32x8::pick(turns, self.z.behind(along.border), self.z.cell(exit, along.first, along.last));
+        // Up, where another block of the level above is entered.
+        let moved = ((next_x ^ self.cell_x) | (next_z ^ self.cell_z)).down(level);
+        let rises = goes & one.below(moved) & level.below(I32x8::splat(ranges.top() as i32));
+        self.level = level + I32x8::pick(rises, one, none) - I32x8::pick(sinks, one, none);
+        self.cell_x = I32x8::pick(goes, next_x, self.cell_x);
+        self.cell_z = I32x8::pick(goes, next_z, self.cell_z);
+        self.t = F64x8::pick(goes, exit, t);
+        self.y = F64x8::pick(goes, after, self.y);
+        let outside = self.x.is_beyond(self.cell_x) | self.z.is_beyond(self.cell_z);
+        self.open = self.open & !(goes & (outside | leave.at_least(self.far)));
+    }
+
+    /// Returns which rays met the surface, and where.
+    #[inline(always)]
+    pub(crate) fn met(&self) -> (Mask8, F64x8) {
+        (self.met, self.patches.first(self.hair()).1)
+    }
+
+    /// Returns what distances may be off by.
+    #[inline(always)]
+    fn hair(&self) -> F64x8 {
+        self.far * F64x8::splat(1e-14)
+    }
+
+    /// Returns the patches of the cells along the rays up to a distance.
+    #[inline(always)]
+    fn here(&self, field: &HeightField, far: F64x8) -> Patches {
+        let ([x, z], near) = ([self.cell_x, self.cell_z], self.t);
         let (heights, columns) = (field.heights(), field.columns() as usize);
         let mut corners = [F32x8::ZERO; 4];
         for i in 0..LANES {
@@ -203,8 +242,8 @@ impl GridRays {
         let (du, dv) = (self.x.slope, self.z.slope);
         let (hu, hv) = (h10 - h00, h01 - h00);
         let twist = h11 - h10 - hv;
-        let c = self.height + self.rise * near - (h00 + hu * u + hv * v + twist * u * v);
-        let b = self.rise - hu * du - hv * dv - twist * (u * dv + v * du);
+        let c = self.true_height + self.true_rise * near - (h00 + hu * u + hv * v + twist * u * v);
+        let b = self.true_rise - hu * du - hv * dv - twist * (u * dv + v * du);
         Patches { a: -(twist * du * dv), b, c, near, span: far - near }
     }
 }
@@ -213,15 +252,14 @@ impl Patches {
     const NONE: Self =
         Self { a: F64x8::ZERO, b: F64x8::ZERO, c: F64x8::ZERO, near: F64x8::ZERO, span: F64x8::ZERO };
 
+    /// Takes some of others.
     #[inline(always)]
-    fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
-        Self {
-            a: F64x8::pick(mask, yes.a, no.a),
-            b: F64x8::pick(mask, yes.b, no.b),
-            c: F64x8::pick(mask, yes.c, no.c),
-            near: F64x8::pick(mask, yes.near, no.near),
-            span: F64x8::pick(mask, yes.span, no.span),
-        }
+    fn take(&mut self, mask: Mask8, other: &Self) {
+        self.a = F64x8::pick(mask, other.a, self.a);
+        self.b = F64x8::pick(mask, other.b, self.b);
+        self.c = F64x8::pick(mask, other.c, self.c);
+        self.near = F64x8::pick(mask, other.near, self.near);
+        self.span = F64x8::pick(mask, other.span, self.span);
     }
 
     #[inline(always)]

@@ -6,9 +6,9 @@
 
 use crate::bundle::{COLUMNS, Hits, NOWHERE, OCTETS, Rays};
 use crate::height_ranges::Ranges;
-use crate::height_walk::GridRays;
+use crate::height_walk::Walk;
 use crate::pyramid::{Pyramid, clip};
-use glam::DAffine3;
+use glam::{DAffine3, DVec2};
 use polyptych_core::lanes::{DVec3x8, F64x8, Mask8};
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::HeightField;
@@ -30,6 +30,8 @@ pub(crate) struct HeightBody {
 #[derive(Default)]
 pub(crate) struct HeightScratch {
     rays: Vec<Local>,
+    /// Those that are on their way, by octet.
+    walks: Vec<(usize, Walk)>,
 }
 
 /// Eight rays in object space with the stretch in which they may meet something.
@@ -80,24 +82,48 @@ impl HeightBody {
         scratch: &mut HeightScratch,
     ) {
         self.enter(object_from_world, rays, hits, &mut scratch.rays);
-        let Some(start) = self.first_near(field, &scratch.rays, 0.0, 1.0) else { return };
+        let Some((start, length)) = self.first_near(field, &scratch.rays, (0.0, f64::INFINITY), 1.0) else {
+            return;
+        };
         // Blocks of the same columns and a few rows: as wide as high.
+        scratch.walks.clear();
         for first in (0..OCTETS).step_by(BLOCK_ROWS * COLUMNS) {
             for column in 0..COLUMNS {
                 let octets: [usize; BLOCK_ROWS] = std::array::from_fn(|row| first + row * COLUMNS + column);
                 let block = octets.map(|octet| scratch.rays[octet]);
-                let Some(start) = self.first_near(field, &block, start, 0.25) else { continue };
+                let Some((start, _)) = self.first_near(field, &block, (start, length), 0.25) else {
+                    continue;
+                };
                 for octet in octets {
                     let rays = &scratch.rays[octet];
                     let near = rays.near.max(F64x8::splat(start));
                     let open = rays.open & rays.far.at_least(near);
                     if open.any() {
-                        let over_grid = GridRays::new(field, &rays.origin, &rays.direction);
-                        let (met, t) = over_grid.meet(field, &self.ranges, (near, rays.far), open);
-                        hits[octet].improve(met, t, body, NOWHERE);
+                        let ways = (&rays.origin, &rays.direction);
+                        let walk = Walk::start(field, &self.ranges, ways, (near, rays.far), open);
+                        scratch.walks.push((octet, walk));
                     }
                 }
             }
+        }
+        // One step each in turn: the processor begins the next while it waits for what one reads.
+        let walks = &mut scratch.walks;
+        let mut count = walks.len();
+        while count > 0 {
+            let mut at = 0;
+            while at < count {
+                walks[at].1.step(field, &self.ranges);
+                if walks[at].1.open.any() {
+                    at += 1;
+                } else {
+                    count -= 1;
+                    walks.swap(at, count);
+                }
+            }
+        }
+        for (octet, walk) in walks {
+            let (met, t) = walk.met();
+            hits[*octet].improve(met, t, body, NOWHERE);
         }
     }
 
@@ -116,24 +142,32 @@ impl HeightBody {
         }
     }
 
-    /// Returns a distance before which none of some rays meets anything: where the stretches that can be jumped get
-    /// shorter than a share of the width of the rays. Nothing where they meet nothing at all.
+    /// Returns a distance before which none of some rays meets anything, and the length of the stretches that were
+    /// jumped last, where those get shorter than a share of the width of the rays. Nothing where they meet nothing at
+    /// all. Begins at a distance with stretches of some length.
     #[inline(always)]
-    fn first_near(&self, field: &HeightField, rays: &[Local], start: f64, share: f64) -> Option<f64> {
+    fn first_near(
+        &self,
+        field: &HeightField,
+        rays: &[Local],
+        (start, length): (f64, f64),
+        share: f64,
+    ) -> Option<(f64, f64)> {
         let bounded = rays.iter().map(|r| (r.open, r.origin, r.direction, r.near, r.far));
         let (pyramid, near, far) = Pyramid::around(bounded)?;
+        let over_grid = OverGrid::new(field);
         let mut begin = near.max(start);
-        let mut length = (far - begin) * 0.125;
+        let mut length = length.min((far - begin) * 0.125);
         // Rays that go all ways get no further than their longest: the loop ends, as the stretch is halved each time.
         while begin < far {
             let end = (begin + length).min(far);
-            if self.is_clear(field, &pyramid.between(begin, end)) {
+            if self.is_clear(&over_grid, &pyramid.between(begin, end)) {
                 begin = end;
                 length += length;
             } else {
                 length *= 0.5;
                 if length <= share * pyramid.width(begin) || length <= 1e-6 * (far - near) {
-                    return Some(begin);
+                    return Some((begin, length));
                 }
             }
         }
@@ -142,21 +176,20 @@ impl HeightBody {
 
     /// Tells whether a box is above or below all heights under it.
     #[inline(always)]
-    fn is_clear(&self, field: &HeightField, part: &Aabb) -> bool {
-        let low = field.grid_from_plane(part.min.x, part.min.z);
-        let high = field.grid_from_plane(part.max.x, part.max.z);
-        let cells = (high - low).max_element();
-        let mut level = 1;
-        while level < self.ranges.top() && cells > f64::from(1u32 << level) * (CELLS - 1) as f64 {
-            level += 1;
-        }
+    fn is_clear(&self, over_grid: &OverGrid, part: &Aabb) -> bool {
+        let low = DVec2::new(part.min.x, part.min.z) * over_grid.cells + over_grid.middle;
+        let high = DVec2::new(part.max.x, part.max.z) * over_grid.cells + over_grid.middle;
+        // Blocks of which so many hold the box, and no more than one more.
+        let cells = (high - low).max_element() / (CELLS - 1) as f64;
+        let level = (cells as u32).checked_ilog2().map_or(1, |l| l as usize + 1).min(self.ranges.top());
         let one_over = 1.0 / f64::from(1u32 << level);
-        let [columns, rows] = self.ranges.size(level);
-        let inside = |v: f64, count: u32| (v * one_over).floor().clamp(0.0, f64::from(count - 1)) as u32;
+        let [columns, rows] = self.ranges.size(level).map(|n| n as i32 - 1);
+        let inside = |v: f64, last: i32| ((v * one_over).floor() as i32).clamp(0, last) as u32;
         let [steps, zero] = self.ranges.scale();
         let (bottom, top) = (part.min.y * steps + zero, part.max.y * steps + zero);
+        let (first, last) = (inside(low.x, columns), inside(high.x, columns));
         for row in inside(low.y, rows)..=inside(high.y, rows) {
-            for column in inside(low.x, columns)..=inside(high.x, columns) {
+            for column in first..=last {
                 let [lowest, highest] = self.ranges.of_block([column, row], level);
                 if bottom <= highest && top >= lowest {
                     return false;
@@ -164,5 +197,19 @@ impl HeightBody {
             }
         }
         true
+    }
+}
+
+/// Turns places over the base plane into cells from the first one.
+struct OverGrid {
+    cells: DVec2,
+    middle: DVec2,
+}
+
+impl OverGrid {
+    #[inline(always)]
+    fn new(field: &HeightField) -> Self {
+        let middle = DVec2::new(f64::from(field.columns() - 1), f64::from(field.rows() - 1)) * 0.5;
+        Self { cells: field.cell_size().recip(), middle }
     }
 }
