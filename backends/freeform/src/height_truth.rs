@@ -158,8 +158,11 @@ fn count(rays: u32, seed: u64) -> [u32; 3] {
                 direction.set(i, ray.direction);
                 (near.0[i], far.0[i]) = (ray.near, ray.far);
             }
-            let (met, t) =
-                GridRays::new(&field, &origin, &direction).meet(&field, &ranges, (near, far), open);
+            let mut walk = Walk::start(&field, &ranges, (&origin, &direction), (near, far), open);
+            while walk.open.any() {
+                walk.step(&field, &ranges);
+            }
+            let (met, t) = walk.met();
             for (i, ray) in made.iter().enumerate().filter_map(|(i, r)| r.as_ref().map(|r| (i, r))) {
                 let (truth, found) = (ray.meet(&field), met.has(i).then_some(t.0[i]));
                 // Where rays come from far away their places are known no better.
