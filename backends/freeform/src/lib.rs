@@ -27,6 +27,10 @@ mod edges;
 mod field;
 mod form;
 mod frame;
+mod height_ranges;
+#[cfg(test)]
+mod height_truth;
+mod height_walk;
 mod heights;
 mod layers;
 mod light;

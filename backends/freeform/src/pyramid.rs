@@ -1,7 +1,7 @@
 //! What holds all rays of a tile between two distances?
 
 use glam::DVec3;
-use polyptych_core::lanes::{DVec3x8, F64x8, Mask8};
+use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
 use polyptych_core::math::Aabb;
 
 /// A stretch is halved while it is so much longer than the tile is wide.
@@ -19,33 +19,18 @@ impl Pyramid {
     pub(crate) fn around(
         rays: impl Iterator<Item = (Mask8, DVec3x8, DVec3x8, F64x8, F64x8)>,
     ) -> Option<(Self, f64, f64)> {
+        let (mut origins, mut directions) = (Extent::NONE, Extent::NONE);
         let (top, bottom) = (F64x8::splat(f64::INFINITY), F64x8::splat(f64::NEG_INFINITY));
-        let (mut low, mut high) = ([top; 7], [bottom; 7]);
-        for (open, o, d, near, far) in rays {
-            let numbers = [o.x, o.y, o.z, d.x, d.y, d.z];
-            if (!open).any() {
-                for i in 0..6 {
-                    low[i] = low[i].min(F64x8::pick(open, numbers[i], top));
-                    high[i] = high[i].max(F64x8::pick(open, numbers[i], bottom));
-                }
-                low[6] = low[6].min(F64x8::pick(open, near, top));
-                high[6] = high[6].max(F64x8::pick(open, far, bottom));
-            } else {
-                for i in 0..6 {
-                    low[i] = low[i].min(numbers[i]);
-                    high[i] = high[i].max(numbers[i]);
-                }
-                low[6] = low[6].min(near);
-                high[6] = high[6].max(far);
-            }
+        let (mut first, mut last) = (top, bottom);
+        for (open, origin, direction, near, far) in rays {
+            origins.add(open, origin);
+            directions.add(open, direction);
+            first = first.min(F64x8::pick(open, near, top));
+            last = last.max(F64x8::pick(open, far, bottom));
         }
-        let low = low.map(|v| v.0.into_iter().fold(f64::INFINITY, f64::min));
-        let high = high.map(|v| v.0.into_iter().fold(f64::NEG_INFINITY, f64::max));
-        let boxed = |i: usize| {
-            let [from, to] = [&low, &high].map(|v| DVec3::new(v[i], v[i + 1], v[i + 2]));
-            Aabb::new(from, to)
-        };
-        (low[6] <= high[6]).then(|| (Self { origins: boxed(0), directions: boxed(3) }, low[6], high[6]))
+        let (near, far) = (least(first), most(last));
+        (near <= far)
+            .then(|| (Self { origins: origins.bounds(), directions: directions.bounds() }, near, far))
     }
 
     /// Returns how wide all rays together are at a distance.
@@ -66,6 +51,53 @@ impl Pyramid {
     pub(crate) fn is_slender(&self, a: f64, b: f64) -> bool {
         self.directions.center().length() * (b - a) > SLENDER * self.width(b)
     }
+}
+
+/// Bounds of some vectors, lane by lane. Each axis is named: of a loop over axes compilers make one that gathers eight
+/// lanes of each from all over the stack.
+struct Extent {
+    low: DVec3x8,
+    high: DVec3x8,
+}
+
+impl Extent {
+    const NONE: Self = {
+        let (top, bottom) = (F64x8([f64::INFINITY; LANES]), F64x8([f64::NEG_INFINITY; LANES]));
+        Self { low: DVec3x8 { x: top, y: top, z: top }, high: DVec3x8 { x: bottom, y: bottom, z: bottom } }
+    };
+
+    #[inline(always)]
+    fn add(&mut self, open: Mask8, v: DVec3x8) {
+        let (low, high) = (DVec3x8::pick(open, v, Self::NONE.low), DVec3x8::pick(open, v, Self::NONE.high));
+        self.low.x = self.low.x.min(low.x);
+        self.low.y = self.low.y.min(low.y);
+        self.low.z = self.low.z.min(low.z);
+        self.high.x = self.high.x.max(high.x);
+        self.high.y = self.high.y.max(high.y);
+        self.high.z = self.high.z.max(high.z);
+    }
+
+    #[inline(always)]
+    fn bounds(&self) -> Aabb {
+        let (low, high) = (&self.low, &self.high);
+        Aabb::new(
+            DVec3::new(least(low.x), least(low.y), least(low.z)),
+            DVec3::new(most(high.x), most(high.y), most(high.z)),
+        )
+    }
+}
+
+/// Returns the smallest of eight numbers.
+#[inline(always)]
+fn least(v: F64x8) -> f64 {
+    let [a, b, c, d, e, f, g, h] = v.0;
+    a.min(b).min(c.min(d)).min(e.min(f).min(g.min(h)))
+}
+
+/// Returns the largest of eight numbers.
+#[inline(always)]
+fn most(v: F64x8) -> f64 {
+    -least(-v)
 }
 
 /// Returns where rays enter and leave a box, as [`Aabb::clip`]; rays in a face plane are inside.
