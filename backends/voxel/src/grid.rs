@@ -1,6 +1,7 @@
 //! Which chunks make a grid, and which of them must be built anew after an edit?
 
-use crate::occupancy::{Occupancy, Values};
+use crate::masks::Masks;
+use crate::occupancy::{Nodes, Occupancy, Values};
 use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{CHUNK, Chunk, Voxels};
 use std::collections::{HashMap, HashSet};
@@ -13,8 +14,10 @@ pub(crate) struct Layer {
     /// Chunks in a row along x, and in a slab of x and y.
     pub(crate) row: usize,
     pub(crate) slab: usize,
-    /// Empty chunks share the masks of one.
-    pub(crate) chunks: Vec<Arc<Occupancy>>,
+    /// Where the masks of each chunk are; empty ones show [`Masks::NOTHING`].
+    pub(crate) slots: Vec<u32>,
+    /// Those of all layers of a grid.
+    pub(crate) masks: Arc<Masks>,
 }
 
 impl Layer {
@@ -23,7 +26,7 @@ impl Layer {
     pub(crate) fn empty_around(&self, cell: [i32; 3]) -> Option<u32> {
         let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         let chunk = |c: u32| (c / CHUNK) as usize;
-        self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)].empty_around([x, y, z])
+        self.nodes(chunk(z) * self.slab + chunk(y) * self.row + chunk(x)).empty_around([x, y, z])
     }
 
     /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells at a cell; false beyond the
@@ -34,11 +37,17 @@ impl Layer {
         }
         let [x, y, z] = [cell[0] as u32, cell[1] as u32, cell[2] as u32];
         let chunk = |c: u32| (c / CHUNK) as usize;
-        self.chunks[chunk(z) * self.slab + chunk(y) * self.row + chunk(x)].has_block([x, y, z], exponent)
+        self.nodes(chunk(z) * self.slab + chunk(y) * self.row + chunk(x)).has_block([x, y, z], exponent)
+    }
+
+    /// Returns the masks of a chunk.
+    #[inline(always)]
+    pub(crate) fn nodes(&self, chunk: usize) -> Nodes<'_> {
+        self.masks.nodes(self.slots[chunk])
     }
 
     fn bytes(&self) -> u64 {
-        (self.chunks.len() * size_of::<Arc<Occupancy>>()) as u64
+        (self.slots.len() * size_of::<u32>()) as u64
     }
 }
 
@@ -52,8 +61,6 @@ pub(crate) struct Grid {
     /// Which bytes may be seen, and which may block light.
     values: [Values; 2],
     voxels: Voxels,
-    /// How many masks of chunks there are; chunks may share them.
-    masks: u64,
 }
 
 impl Grid {
@@ -72,53 +79,51 @@ impl Grid {
         self.seen.bytes() + self.blocking.bytes() + self.voxels.chunks().len() as u64 * 16
     }
 
-    /// Counts the masks that a chunk shares with no other.
-    fn own_masks(&self, index: usize) -> u64 {
-        let [seen, blocking] = [&self.seen.chunks[index], &self.blocking.chunks[index]];
-        let is_one = Arc::ptr_eq(seen, blocking);
-        let is_own =
-            |masks: &Arc<Occupancy>| !masks.is_empty() && Arc::strong_count(masks) == 1 + usize::from(is_one);
-        u64::from(is_own(seen)) + u64::from(!is_one && is_own(blocking))
-    }
-
     /// Returns how many cells of a chunk lie in the grid along each axis.
     fn end(voxels: &Voxels, index: usize) -> [u32; 3] {
         let first = voxels.chunk_origin(index);
         std::array::from_fn(|a| CHUNK.min(voxels.size()[a] - first[a]))
     }
 
-    /// Takes over a chunk that became another.
-    fn update(&mut self, index: usize, chunk: &Chunk, nothing: &Arc<Occupancy>) {
-        let end = Self::end(&self.voxels, index);
-        let own = self.own_masks(index);
-        let is_one = Arc::ptr_eq(&self.seen.chunks[index], &self.blocking.chunks[index]);
+    /// Takes over chunks that became others.
+    fn update(&mut self, changed: &[usize], chunks: &[Chunk]) {
+        // Both layers hold the table: only who holds it alone may change it where it is.
+        self.blocking.masks = Arc::default();
+        let masks = Arc::make_mut(&mut self.seen.masks);
         let [seen, blocking] = self.values;
-        let old = self.voxels.chunks()[index].clone();
-        // What lets light through may come in with the edit: then both layers part.
-        let differs = seen != blocking && !is_one;
-        let renew = |layer: &mut Layer, values: &Values| {
-            let masks = &mut layer.chunks[index];
-            if let (Chunk::Cells(old), Chunk::Cells(new)) = (&old, chunk) {
-                Arc::make_mut(masks).renew((old, new), end, values);
+        for &index in changed {
+            let (old, chunk) = (&self.voxels.chunks()[index], &chunks[index]);
+            let end = Self::end(&self.voxels, index);
+            let renew = |masks: &mut Masks, slot: u32, values: &Values| {
+                if let (Chunk::Cells(old), Chunk::Cells(new)) = (old, chunk) {
+                    return masks.change(slot, |nodes| nodes.renew((old, new), end, values));
+                }
+                masks.hide(slot);
+                let slot = masks.put(Occupancy::of(chunk, end, values).as_deref());
+                masks.show(slot);
+                slot
+            };
+            let (slot, other) = (&mut self.seen.slots[index], &mut self.blocking.slots[index]);
+            let is_one = slot == other;
+            if is_one {
+                masks.hide(*other);
+            }
+            *slot = renew(masks, *slot, &seen);
+            if seen == blocking {
+                *other = *slot;
+                masks.show(*other);
+            } else if is_one {
+                // What lets light through may come in with the edit: then both layers part.
+                let marks = Occupancy::of(chunk, end, &blocking);
+                let is_same = marks.as_ref().is_some_and(|marks| masks.nodes(*slot) == marks.nodes());
+                *other = if is_same { *slot } else { masks.put(marks.as_deref()) };
+                masks.show(*other);
             } else {
-                *masks = Occupancy::of(chunk, end, values).map_or_else(|| nothing.clone(), Arc::from);
+                *other = renew(masks, *other, &blocking);
             }
-            if masks.is_empty() {
-                *masks = nothing.clone();
-            }
-        };
-        renew(&mut self.seen, &seen);
-        if seen == blocking {
-            self.blocking.chunks[index] = self.seen.chunks[index].clone();
-        } else if differs {
-            renew(&mut self.blocking, &blocking);
-        } else {
-            let masks = Occupancy::of(chunk, end, &blocking).map_or_else(|| nothing.clone(), Arc::from);
-            let same = masks == self.seen.chunks[index];
-            self.blocking.chunks[index] = if same { self.seen.chunks[index].clone() } else { masks };
+            self.voxels.put_chunk(index, chunk.clone());
         }
-        self.voxels.put_chunk(index, chunk.clone());
-        self.masks = (self.masks + self.own_masks(index)).saturating_sub(own);
+        self.blocking.masks = self.seen.masks.clone();
     }
 }
 
@@ -136,8 +141,11 @@ enum Source {
     Cells(usize),
 }
 
-/// Masks of what is seen, and of what blocks light.
-type Built = [Arc<Occupancy>; 2];
+/// Masks of what is seen, and of what blocks light where that is something else.
+type Built = [Option<Box<Occupancy>>; 2];
+
+/// How many chunks are built before their masks are put in place: what is built is there twice for a while.
+const BUILT_AT_ONCE: usize = 256;
 
 impl Recipe {
     /// Nothing for an empty chunk.
@@ -153,19 +161,12 @@ impl Recipe {
 
 /// Grids with the masks of their chunks, kept from one `prepare` to the next. A grid that became another by edits is
 /// changed where they are; of one whose chunks are at other places masks are found again by the identity of cells.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Chunks {
     kept: Vec<Arc<Grid>>,
     used: Vec<Arc<Grid>>,
-    nothing: Arc<Occupancy>,
     /// Chunks that had to be built since [`Chunks::begin`].
     pub(crate) built: u64,
-}
-
-impl Default for Chunks {
-    fn default() -> Self {
-        Self { kept: Vec::new(), used: Vec::new(), nothing: Arc::new(Occupancy::EMPTY), built: 0 }
-    }
 }
 
 impl Chunks {
@@ -182,7 +183,7 @@ impl Chunks {
 
     /// Returns the bytes of all masks.
     pub(crate) fn bytes(&self) -> u64 {
-        self.used.iter().map(|grid| grid.masks).sum::<u64>() * size_of::<Occupancy>() as u64
+        self.used.iter().map(|grid| grid.seen.masks.used()).sum::<u64>() * size_of::<Occupancy>() as u64
     }
 
     /// Makes a grid ready; `seen` are the values that may be seen, `blocking` those that may block light.
@@ -213,64 +214,76 @@ impl Chunks {
         })?;
         let mut grid = self.kept.swap_remove(at);
         if !changed.is_empty() {
-            let grid = Arc::make_mut(&mut grid);
-            for &index in &changed {
-                grid.update(index, &voxels.chunks()[index], &self.nothing);
-            }
+            Arc::make_mut(&mut grid).update(&changed, voxels.chunks());
         }
         self.built += changed.len() as u64;
         Some(grid)
     }
 
-    /// Builds a grid; masks of chunks that grids of before had, too, are theirs.
+    /// Builds a grid. One of before that has chunks of it gives it its masks.
     fn build(&mut self, voxels: &Voxels, values: [Values; 2], threads: &dyn Threads) -> Grid {
-        let mut known: HashMap<Recipe, Built> = HashMap::new();
-        for old in self.kept.iter().chain(&self.used).filter(|old| old.values == values) {
-            for index in 0..old.voxels.chunks().len() {
-                if let Some(recipe) = Recipe::of(&old.voxels, index) {
-                    let masks = [old.seen.chunks[index].clone(), old.blocking.chunks[index].clone()];
-                    known.insert(recipe, masks);
-                }
-            }
-        }
         let recipes: Vec<Option<Recipe>> =
             (0..voxels.chunks().len()).map(|index| Recipe::of(voxels, index)).collect();
-        let mut missing: Vec<(Recipe, &Chunk, Option<Built>)> = Vec::new();
+        let wanted: HashSet<Recipe> = recipes.iter().flatten().copied().collect();
+        let shared = |old: &Arc<Grid>| {
+            let recipes = (0..old.voxels.chunks().len()).filter_map(|index| Recipe::of(&old.voxels, index));
+            if old.values == values { recipes.filter(|recipe| wanted.contains(recipe)).count() } else { 0 }
+        };
+        let most = (0..self.kept.len()).max_by_key(|&at| shared(&self.kept[at]));
+        let old = most.filter(|&at| shared(&self.kept[at]) > 0).map(|at| self.kept.swap_remove(at));
+        let mut known: HashMap<Recipe, [u32; 2]> = HashMap::new();
+        let mut masks = Masks::default();
+        if let Some(old) = old {
+            for index in 0..old.voxels.chunks().len() {
+                if let Some(recipe) = Recipe::of(&old.voxels, index).filter(|recipe| wanted.contains(recipe))
+                {
+                    known.insert(recipe, [old.seen.slots[index], old.blocking.slots[index]]);
+                }
+            }
+            let Grid { seen, blocking, .. } = Arc::unwrap_or_clone(old);
+            drop(blocking);
+            masks = Arc::unwrap_or_clone(seen.masks);
+            let [first, second]: [Vec<u32>; 2] =
+                [0, 1].map(|i| known.values().map(|slots| slots[i]).collect());
+            masks.count([&first, &second]);
+        }
+        let mut missing: Vec<(Recipe, &Chunk, Built)> = Vec::new();
         let mut asked = HashSet::new();
         for (recipe, chunk) in recipes.iter().zip(voxels.chunks()) {
             if let Some(recipe) = recipe
                 && !known.contains_key(recipe)
                 && asked.insert(*recipe)
             {
-                missing.push((*recipe, chunk, None));
+                missing.push((*recipe, chunk, [None, None]));
             }
         }
         self.built += missing.len() as u64;
-        let nothing = &self.nothing;
-        for_each_mut(threads, &mut missing, 1, &|_, (recipe, chunk, built)| {
-            let marks =
-                |values| Occupancy::of(chunk, recipe.end, values).map_or_else(|| nothing.clone(), Arc::from);
-            let seen: Arc<Occupancy> = marks(&values[0]);
-            // Most chunks hold nothing that is seen but lets light through: then both are one.
-            let blocking = if values[0] == values[1] { seen.clone() } else { marks(&values[1]) };
-            let blocking = if blocking == seen { seen.clone() } else { blocking };
-            *built = Some([seen, blocking]);
-        });
-        known.extend(missing.into_iter().filter_map(|(recipe, _, built)| Some((recipe, built?))));
-        let [cx, cy, _] = voxels.chunks_per_axis().map(|c| c as usize);
-        let layer = |which: usize| Layer {
-            size: voxels.size().map(|s| s as i32),
-            row: cx,
-            slab: cx * cy,
-            chunks: recipes
-                .iter()
-                .map(|r| r.as_ref().and_then(|r| known.get(r)).map_or(&self.nothing, |b| &b[which]).clone())
-                .collect(),
+        masks.reserve(missing.len());
+        for missing in missing.chunks_mut(BUILT_AT_ONCE) {
+            for_each_mut(threads, missing, 1, &|_, (recipe, chunk, built)| {
+                let marks = |values| Occupancy::of(chunk, recipe.end, values);
+                built[0] = marks(&values[0]);
+                // Most chunks hold nothing that is seen but lets light through: then both are one.
+                built[1] = if values[0] == values[1] { None } else { marks(&values[1]) };
+            });
+            for (recipe, _, built) in missing {
+                let [seen, blocking] = std::mem::take(built);
+                let slot = masks.put(seen.as_deref());
+                let is_one = values[0] == values[1] || seen == blocking;
+                known.insert(*recipe, [slot, if is_one { slot } else { masks.put(blocking.as_deref()) }]);
+            }
+        }
+        let slots_of = |which: usize| -> Vec<u32> {
+            let slots = recipes.iter().map(|r| r.as_ref().and_then(|r| known.get(r)));
+            slots.map(|slots| slots.map_or(Masks::NOTHING, |slots| slots[which])).collect()
         };
-        let (seen, blocking) = (layer(0), layer(1));
-        let masks = seen.chunks.iter().chain(&blocking.chunks).filter(|masks| !masks.is_empty());
-        let masks: HashSet<usize> = masks.map(|masks| Arc::as_ptr(masks).addr()).collect();
-        Grid { seen, blocking, values, voxels: voxels.clone(), masks: masks.len() as u64 }
+        let (seen, blocking) = (slots_of(0), slots_of(1));
+        masks.count([&seen, &blocking]);
+        let masks = Arc::new(masks);
+        let [cx, cy, _] = voxels.chunks_per_axis().map(|c| c as usize);
+        let size = voxels.size().map(|s| s as i32);
+        let layer = |slots| Layer { size, row: cx, slab: cx * cy, slots, masks: masks.clone() };
+        Grid { seen: layer(seen), blocking: layer(blocking), values, voxels: voxels.clone() }
     }
 }
 
@@ -321,7 +334,9 @@ mod tests {
             chunks.end();
             let anew = Chunks::default().grid(&voxels, all, solid, &OneThread);
             for (layer, other) in [(&grid.seen, &anew.seen), (&grid.blocking, &anew.blocking)] {
-                assert!(layer.chunks == other.chunks, "round {round}");
+                for chunk in 0..layer.slots.len() {
+                    assert!(layer.nodes(chunk) == other.nodes(chunk), "round {round}");
+                }
             }
             drop(grid);
             let from = [random(130), random(70), random(65)];
@@ -337,8 +352,8 @@ mod tests {
         let voxels = Voxels::from_fn([128, 4, 4], |x, _, _| if x < 64 { 1 } else { 2 });
         let mut chunks = Chunks::default();
         let grid = chunks.grid(&voxels, Values::of(|_| true), Values::of(|v| v == 1), &OneThread);
-        let same = |i: usize| Arc::ptr_eq(&grid.seen.chunks[i], &grid.blocking.chunks[i]);
+        let same = |i: usize| grid.seen.slots[i] == grid.blocking.slots[i];
         assert_eq!((same(0), same(1)), (true, false));
-        assert_eq!(*grid.blocking.chunks[1], Occupancy::EMPTY);
+        assert_eq!(grid.blocking.slots[1], Masks::NOTHING);
     }
 }

@@ -6,14 +6,15 @@
 //! are no grids are turned into ones first, and the report says how far their surface moved.
 //!
 //! - [`Voxel`] is the renderer, [`Factory`] makes it for a registry.
-//! - `occupancy` answers where in a chunk is nothing, `grid` puts chunks together and keeps them over edits.
+//! - `occupancy` answers where in a chunk is nothing, `masks` keeps those answers in tables, `grid` puts chunks together
+//!   and keeps them over edits.
 //! - `beam` finds where the rays of a tile can meet anything; `paint` draws the tiles.
 //! - `walk` follows one ray through one grid, or eight at once; `world` and `octet` find what they meet among many;
 //!   `trace` and `light` color it.
 //!
-//! Rays of the eye and those toward lights go in packets of eight neighbors, in single precision with the steps that it
-//! leaves in doubt taken in double; what goes on through glass, or comes from a mirror, goes alone. The parameter `walk`
-//! chooses other numbers.
+//! Rays of the eye and those toward lights go in packets of eight neighbors, two packets at once where the processor has
+//! AVX-512: in single precision with the steps that it leaves in doubt taken in double. What goes on through glass, or
+//! comes from a mirror, goes alone. The parameter `walk` chooses other numbers.
 //!
 //! Where it is asked for, blocks of cells that are no larger than a pixel are drawn as one; see `levels`.
 //!
@@ -24,6 +25,7 @@ mod grid;
 mod lamps;
 mod levels;
 mod light;
+mod masks;
 mod model;
 mod occupancy;
 mod octet;

@@ -1,20 +1,39 @@
 //! How are eight pixels lit, and what is written of them? The answers of [`Tracer::color`], eight at a time, for
 //! solids that are no mirrors; others are asked of it.
 
-use crate::octet::{NOTHING, Octet};
+use crate::lamps::Lamp;
+use crate::octet::{NOTHING, Octet, Way};
 use crate::paint::Row;
 use crate::trace::{Shadows, Tracer, Wants, finite};
 use crate::world::Reach;
 use glam::{DVec3, Vec3};
 use polyptych_core::framebuffer::{Band, Channel, Channels, Pixel};
-use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8, Vec3x8};
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
+use polyptych_core::math::Ray;
 use polyptych_core::scene::Material;
 use polyptych_core::shade::{fogged, lit_by_material};
 
 /// Colors of eight points, and the shares of lights that reach them.
+#[derive(Clone, Copy)]
 struct Lit {
     color: Vec3x8,
     shadow: [f32; LANES],
+}
+
+impl Lit {
+    const NONE: Self = Self {
+        color: Vec3x8 { x: F32x8([0.0; LANES]), y: F32x8([0.0; LANES]), z: F32x8([0.0; LANES]) },
+        shadow: [1.0; LANES],
+    };
+}
+
+/// The light of a lamp at eight points.
+struct Arriving {
+    /// Where it comes from, and which points ask whether anything is between.
+    way: Way,
+    share: Vec3x8,
+    /// Where the lamp shines at all.
+    arrives: Mask8,
 }
 
 /// What is known of eight points before they are lit.
@@ -52,6 +71,10 @@ impl Tracer<'_> {
         };
         let is_colored = channels.has(Channel::Color) || channels.has(Channel::Albedo);
         let shadow = channels.has(Channel::Shadow);
+        if !is_colored && !shadow && !channels.has(Channel::Normal) {
+            points.plain = Mask8::ALL;
+            return points;
+        }
         for i in 0..LANES {
             let Some(item) = self.world.items.get(octet.item[i] as usize) else { continue };
             points.normal.set(i, item.normals[usize::from(octet.face[i])]);
@@ -72,11 +95,34 @@ impl Tracer<'_> {
         points
     }
 
-    /// Writes what eight neighboring pixels of a row see, from a place of the band on.
+    /// Writes what twice eight neighboring pixels of a row see, from places of the band on.
     #[inline(always)]
     pub(crate) fn write(
         &self,
-        octet: &Octet,
+        octets: &[Octet; 2],
+        lights: &[Option<Reach>],
+        wants: Wants,
+        band: &mut Band<'_>,
+        channels: Channels,
+        places: [Row; 2],
+    ) {
+        let points = [self.points(&octets[0], channels), self.points(&octets[1], channels)];
+        let mut lit = [Lit::NONE; 2];
+        if wants.color || wants.shadow {
+            lit = self.light_octets(octets, &points, lights, wants);
+        }
+        for k in 0..2 {
+            if places[k].count > 0 {
+                self.write_row((&octets[k], &points[k], &lit[k]), lights, wants, band, channels, places[k]);
+            }
+        }
+    }
+
+    /// Writes what eight neighboring pixels of a row see.
+    #[inline(always)]
+    fn write_row(
+        &self,
+        (octet, points, lit): (&Octet, &Points<'_>, &Lit),
         lights: &[Option<Reach>],
         wants: Wants,
         band: &mut Band<'_>,
@@ -86,11 +132,9 @@ impl Tracer<'_> {
         let Row { x, row, stride, count } = place;
         let count = count as usize;
         let first = (row * band.width + x) as usize;
-        let points = self.points(octet, channels);
         let seen = octet.seen();
         let environment = &self.world.scene.environment;
         if wants.color || wants.shadow {
-            let lit = self.light_octet(octet, &points, lights, wants);
             if wants.color {
                 let background = environment.background.gradient().colors(octet.rays.direction.y.round());
                 let mut colors = [Vec3::ZERO; LANES];
@@ -142,99 +186,132 @@ impl Tracer<'_> {
 
     /// Lights the points that are plain.
     #[inline(always)]
-    fn light_octet(&self, octet: &Octet, points: &Points<'_>, lights: &[Option<Reach>], wants: Wants) -> Lit {
+    fn light_octets(
+        &self,
+        octets: &[Octet; 2],
+        points: &[Points<'_>; 2],
+        lights: &[Option<Reach>],
+        wants: Wants,
+    ) -> [Lit; 2] {
         let environment = &self.world.scene.environment;
-        let normal = points.normal.round();
-        let to_eye = DVec3x8::splat(DVec3::ZERO) - octet.rays.direction;
-        let to_eye = to_eye.round();
-        let mut lit = Lit { color: Vec3x8::splat(Vec3::ZERO), shadow: [1.0; LANES] };
-        let mut asked = octet.seen() & points.plain;
+        let mut lit = [Lit::NONE; 2];
+        let mut asked = [octets[0].seen() & points[0].plain, octets[1].seen() & points[1].plain];
         if wants.color {
-            for (i, material) in points.materials.iter().enumerate() {
-                if let Some(m) = material {
-                    lit.color.set(i, m.emission + environment.ambient * points.color.get(i) * m.ambient);
-                } else {
-                    asked.0[i] = 0;
+            for k in 0..2 {
+                for (i, material) in points[k].materials.iter().enumerate() {
+                    if let Some(m) = material {
+                        let own = points[k].color.get(i);
+                        lit[k].color.set(i, m.emission + environment.ambient * own * m.ambient);
+                    } else {
+                        asked[k].0[i] = 0;
+                    }
                 }
             }
         }
-        if !asked.any() {
+        if !(asked[0] | asked[1]).any() {
             return lit;
         }
-        let (mut casting, mut reaching) = ([0u32; LANES], [0u32; LANES]);
-        let position = octet.position();
+        let (mut casting, mut reaching) = ([[0u32; LANES]; 2], [[0u32; LANES]; 2]);
         for (index, lamp) in self.world.lamps.iter().enumerate() {
-            let mut to_light = DVec3x8::splat(DVec3::ZERO);
-            let mut radiance = Vec3x8::splat(Vec3::ZERO);
-            let mut ends = F64x8::splat(f64::INFINITY);
-            let mut arrives = Mask8::NONE;
-            if let Some(arriving) = lamp.everywhere() {
-                let Some(arriving) = arriving else { continue };
-                to_light = DVec3x8::splat(arriving.to_light);
-                radiance = Vec3x8::splat(arriving.radiance);
-                arrives = asked;
-            } else {
-                for i in (0..LANES).filter(|&i| asked.has(i)) {
-                    let Some(arriving) = lamp.arriving(position.get(i)) else { continue };
-                    to_light.set(i, arriving.to_light);
-                    radiance.set(i, arriving.radiance);
-                    ends.0[i] = arriving.distance;
-                    arrives.0[i] = u32::MAX;
-                }
-            }
-            if lamp.casts_shadow {
-                for (count, arrives) in casting.iter_mut().zip(arrives.0) {
-                    *count += arrives & 1;
-                }
-            }
-            let facing = arrives & points.normal.dot(to_light).above(F64x8::ZERO);
-            if !facing.any() {
-                continue;
-            }
-            let mut share = Vec3x8::splat(Vec3::ZERO);
-            let mut needed = if wants.shadow && lamp.casts_shadow { facing } else { Mask8::NONE };
-            if wants.color {
-                let model = environment.lighting;
-                let surfaces = (points.color, normal, to_eye);
-                share = lit_by_material(points.materials, surfaces, model, to_light.round(), radiance);
-                for i in 0..LANES {
-                    if facing.has(i) && share.get(i) != Vec3::ZERO {
-                        needed.0[i] = u32::MAX;
-                    }
-                }
-            }
-            let mut reaches = needed;
-            if lamp.is_blocked && self.shadows == Shadows::Hard && needed.any() {
-                self.counts.shadow_rays.set(self.counts.shadow_rays.get() + u64::from(needed.count()));
-                let reach = lights.get(index).and_then(Option::as_ref);
-                if lamp.is_cell() {
-                    let lifted = self.world.lifted(octet, points.normal);
-                    for i in (0..LANES).filter(|&i| needed.has(i)) {
-                        let ray =
-                            polyptych_core::math::Ray { origin: lifted.get(i), direction: to_light.get(i) };
-                        ends.0[i] = lamp.shadow_end(&ray, ends.0[i]);
-                    }
-                }
+            let arriving = [
+                self.arriving(lamp, &octets[0], &points[0], asked[0], wants),
+                self.arriving(lamp, &octets[1], &points[1], asked[1], wants),
+            ];
+            let mut reaches = [arriving[0].way.asked, arriving[1].way.asked];
+            let reach = lights.get(index).and_then(Option::as_ref);
+            if lamp.is_blocked && self.shadows == Shadows::Hard && (reaches[0] | reaches[1]).any() {
+                let count = reaches[0].count() + reaches[1].count();
+                self.counts.shadow_rays.set(self.counts.shadow_rays.get() + u64::from(count));
                 if reach.is_none_or(|reach| !reach.is_empty()) {
-                    let way = (points.normal, to_light, ends);
-                    let blocked = self.world.blocked_octet(octet, way, needed, reach, &self.counts);
-                    reaches = needed & !blocked;
+                    let ways = [arriving[0].way, arriving[1].way];
+                    let blocked = self.world.blocked_octets(octets, &ways, reach, &self.counts);
+                    reaches = [reaches[0] & !blocked[0], reaches[1] & !blocked[1]];
                 }
             }
-            if wants.color {
-                lit.color = lit.color + Vec3x8::pick(reaches, share, Vec3x8::splat(Vec3::ZERO));
-            }
-            if lamp.casts_shadow {
-                for (count, reaches) in reaching.iter_mut().zip(reaches.0) {
-                    *count += reaches & 1;
+            for k in 0..2 {
+                if wants.color {
+                    let nothing = Vec3x8::splat(Vec3::ZERO);
+                    lit[k].color = lit[k].color + Vec3x8::pick(reaches[k], arriving[k].share, nothing);
+                }
+                if lamp.casts_shadow {
+                    for i in 0..LANES {
+                        casting[k][i] += arriving[k].arrives.0[i] & 1;
+                        reaching[k][i] += reaches[k].0[i] & 1;
+                    }
                 }
             }
         }
-        for i in 0..LANES {
-            if casting[i] > 0 {
-                lit.shadow[i] = reaching[i] as f32 / casting[i] as f32;
+        for k in 0..2 {
+            for i in 0..LANES {
+                if casting[k][i] > 0 {
+                    lit[k].shadow[i] = reaching[k][i] as f32 / casting[k][i] as f32;
+                }
             }
         }
         lit
+    }
+
+    /// Finds what a lamp adds to eight points where nothing is between.
+    #[inline(always)]
+    fn arriving(
+        &self,
+        lamp: &Lamp,
+        octet: &Octet,
+        points: &Points<'_>,
+        asked: Mask8,
+        wants: Wants,
+    ) -> Arriving {
+        let environment = &self.world.scene.environment;
+        let mut radiance = Vec3x8::splat(Vec3::ZERO);
+        let mut way = Way {
+            normal: points.normal,
+            to_light: DVec3x8::splat(DVec3::ZERO),
+            ends: F64x8::splat(f64::INFINITY),
+            asked: Mask8::NONE,
+        };
+        let mut arrives = Mask8::NONE;
+        if let Some(everywhere) = lamp.everywhere() {
+            if let Some(arriving) = everywhere {
+                way.to_light = DVec3x8::splat(arriving.to_light);
+                radiance = Vec3x8::splat(arriving.radiance);
+                arrives = asked;
+            }
+        } else {
+            let position = octet.position();
+            for i in (0..LANES).filter(|&i| asked.has(i)) {
+                let Some(arriving) = lamp.arriving(position.get(i)) else { continue };
+                way.to_light.set(i, arriving.to_light);
+                radiance.set(i, arriving.radiance);
+                way.ends.0[i] = arriving.distance;
+                arrives.0[i] = u32::MAX;
+            }
+        }
+        let facing = arrives & points.normal.dot(way.to_light).above(F64x8::ZERO);
+        let mut share = Vec3x8::splat(Vec3::ZERO);
+        if !facing.any() {
+            return Arriving { way, share, arrives };
+        }
+        if wants.shadow && lamp.casts_shadow {
+            way.asked = facing;
+        }
+        if wants.color {
+            let to_eye = DVec3x8::splat(DVec3::ZERO) - octet.rays.direction;
+            let surfaces = (points.color, points.normal.round(), to_eye.round());
+            let model = environment.lighting;
+            share = lit_by_material(points.materials, surfaces, model, way.to_light.round(), radiance);
+            for i in 0..LANES {
+                if facing.has(i) && share.get(i) != Vec3::ZERO {
+                    way.asked.0[i] = u32::MAX;
+                }
+            }
+        }
+        if lamp.is_cell() && lamp.is_blocked && self.shadows == Shadows::Hard {
+            let lifted = self.world.lifted(octet, points.normal);
+            for i in (0..LANES).filter(|&i| way.asked.has(i)) {
+                let ray = Ray { origin: lifted.get(i), direction: way.to_light.get(i) };
+                way.ends.0[i] = lamp.shadow_end(&ray, way.ends.0[i]);
+            }
+        }
+        Arriving { way, share, arrives }
     }
 }

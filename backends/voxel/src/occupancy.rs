@@ -29,9 +29,25 @@ impl Values {
 /// every mask by index alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Occupancy {
-    pub(crate) top: [u32; 2],
-    pub(crate) middle: [u32; 2 * 64],
-    pub(crate) bottom: [u32; 2 * 4096],
+    pub(crate) top: [u32; Self::TOP],
+    pub(crate) middle: [u32; Self::MIDDLE],
+    pub(crate) bottom: [u32; Self::BOTTOM],
+}
+
+/// The same, wherever it is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Nodes<'a> {
+    pub(crate) top: &'a [u32; Occupancy::TOP],
+    pub(crate) middle: &'a [u32; Occupancy::MIDDLE],
+    pub(crate) bottom: &'a [u32; Occupancy::BOTTOM],
+}
+
+/// The same, to be changed.
+#[derive(Debug)]
+pub(crate) struct NodesMut<'a> {
+    pub(crate) top: &'a mut [u32; Occupancy::TOP],
+    pub(crate) middle: &'a mut [u32; Occupancy::MIDDLE],
+    pub(crate) bottom: &'a mut [u32; Occupancy::BOTTOM],
 }
 
 /// Returns the number of a cell's block of `4^n` cells within the node above it, `shift` = 2n: x fastest, then y.
@@ -58,8 +74,14 @@ impl Occupancy {
     /// Bits of the 2^3 children around the first, in the order of [`child`].
     pub(crate) const OCTET: u32 = 0x0033_0033;
 
+    /// Words of each level.
+    pub(crate) const TOP: usize = 2;
+    pub(crate) const MIDDLE: usize = 2 * 64;
+    pub(crate) const BOTTOM: usize = 2 * 4096;
+
     /// Nothing is marked.
-    pub(crate) const EMPTY: Self = Self { top: [0; 2], middle: [0; 2 * 64], bottom: [0; 2 * 4096] };
+    pub(crate) const EMPTY: Self =
+        Self { top: [0; Self::TOP], middle: [0; Self::MIDDLE], bottom: [0; Self::BOTTOM] };
 
     /// Edge of everything it describes, as an exponent of two.
     pub(crate) const EXPONENT: u32 = CHUNK.trailing_zeros();
@@ -112,11 +134,13 @@ impl Occupancy {
         }
     }
 
-    /// Tells whether nothing is marked.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.top == [0; 2]
+    /// Returns its masks as those of a table are.
+    pub(crate) fn nodes(&self) -> Nodes<'_> {
+        Nodes { top: &self.top, middle: &self.middle, bottom: &self.bottom }
     }
+}
 
+impl NodesMut<'_> {
     /// Marks anew what became another byte: blocks of 4^3 cells in which something did.
     pub(crate) fn renew(&mut self, (old, new): (&[u8], &[u8]), end: [u32; 3], wanted: &Values) {
         const ROW: usize = CHUNK as usize;
@@ -161,14 +185,16 @@ impl Occupancy {
         let is_set = self.middle[high << 1] | self.middle[high << 1 | 1] != 0;
         put(&mut self.top[high >> 5], high, is_set);
     }
+}
 
+impl Nodes<'_> {
     /// Tells whether anything is marked in the aligned block of 2^2, 2^4 or 2^6 cells around a cell.
     pub(crate) fn has_block(&self, cell: [u32; 3], exponent: u32) -> bool {
         let (high, low) = (child(cell, 4), child(cell, 2));
         match exponent {
             2 => has(self.middle[high << 1 | low >> 5], low),
             4 => has(self.top[high >> 5], high),
-            _ => self.top != [0; 2],
+            _ => *self.top != [0; 2],
         }
     }
 
@@ -179,7 +205,7 @@ impl Occupancy {
         let high = child(cell, 4);
         let word = self.top[high >> 5];
         if !has(word, high) {
-            return Some(if self.top == [0; 2] { Self::EXPONENT } else { empty(word, high, 4) });
+            return Some(if *self.top == [0; 2] { Occupancy::EXPONENT } else { empty(word, high, 4) });
         }
         let low = child(cell, 2);
         let word = self.middle[high << 1 | low >> 5];
@@ -208,6 +234,7 @@ mod tests {
             (0..64 * 64 * 64u32).map(|i| if hash(i).is_multiple_of(700) { 3 } else { 1 }).collect();
         let chunk = Chunk::Cells(cells.clone().into());
         let marks = Occupancy::of(&chunk, [64; 3], &Values::of(|v| v == 3)).unwrap();
+        let marks = marks.nodes();
         let at = |x: u32, y: u32, z: u32| cells[((z * 64 + y) * 64 + x) as usize];
         let mut sizes = [0u32; 7];
         for i in 0..64 * 64 * 64u32 {
@@ -233,6 +260,7 @@ mod tests {
     #[test]
     fn cells_beyond_the_grid_are_empty() {
         let marks = Occupancy::of(&Chunk::Uniform(9), [3, 64, 1], &Values::of(|v| v == 9)).unwrap();
+        let marks = marks.nodes();
         assert_eq!(marks.empty_around([2, 63, 0]), None);
         assert_eq!(marks.empty_around([3, 63, 0]), Some(0));
         assert_eq!(marks.empty_around([2, 63, 1]), Some(0));

@@ -4,9 +4,12 @@
 //! holes, a ray that began in a cell, a grid too long for single precision) is asked of them, ray by ray.
 
 use crate::beam::Span;
+use crate::grid::Layer;
 use crate::levels::Footprint;
 use crate::walk::packet::{GridRays, Packet, Stretch};
+use crate::walk::steps::find_marked;
 use crate::world::{Counts, LIFT, Met, Place, Reach, Site, World};
+use glam::DAffine3;
 use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
 use polyptych_core::math::Ray;
 
@@ -25,6 +28,58 @@ impl Rays {
     #[inline(always)]
     pub(crate) fn one(&self, lane: usize) -> Ray {
         Ray { origin: self.origin.get(lane), direction: self.direction.get(lane) }
+    }
+}
+
+impl Rays {
+    /// Moves them into the space of a grid.
+    #[inline(always)]
+    fn within(&self, map: &DAffine3) -> GridRays {
+        let origin = self.origin.turned(&map.matrix3) + DVec3x8::splat(map.translation);
+        GridRays::new(origin, self.direction.turned(&map.matrix3), self.there)
+    }
+}
+
+/// Begins where rays of the eye may meet something first: between two distances, and nearer than what they met before.
+#[inline(always)]
+fn first_packet(rays: &GridRays, span: &Span, met: F64x8, [begins, ends]: [f64; 2], layer: &Layer) -> Packet {
+    let (from, to) = span.eight_distances(rays);
+    // Just before the plane: where a ray is then is beyond doubt.
+    let from = (from * F64x8::splat(1.0 - 1e-9)).max(F64x8::splat(begins));
+    let to = minimum(minimum(to, met), F64x8::splat(ends));
+    Packet::begin(rays, layer.size, &Stretch { from, to })
+}
+
+/// Moves rays toward a light into the space of a grid: from its own surfaces, or from above those of others.
+#[inline(always)]
+fn shadow_rays(
+    octet: &Octet,
+    is_own: bool,
+    map: &DAffine3,
+    (lifted, to_light): (DVec3x8, DVec3x8),
+    there: Mask8,
+) -> GridRays {
+    if is_own {
+        GridRays::new(octet.site, to_light.turned(&map.matrix3), there)
+    } else {
+        Rays { origin: lifted, direction: to_light, there }.within(map)
+    }
+}
+
+/// Begins where they may meet something first.
+#[inline(always)]
+fn shadow_packet(
+    rays: &GridRays,
+    is_own: bool,
+    span: &Span,
+    (before, ends): ([I32x8; 3], F64x8),
+    layer: &Layer,
+) -> Packet {
+    let to = minimum(span.eight_distances(rays).1, ends);
+    if is_own {
+        Packet::begin_in(rays, layer.size, before, to)
+    } else {
+        Packet::begin(rays, layer.size, &Stretch { from: F64x8::ZERO, to })
     }
 }
 
@@ -47,6 +102,18 @@ pub(crate) struct Octet {
     pub(crate) before: [I32x8; 3],
     /// See [`crate::walk::Walk::rank`].
     pub(crate) rank: [i32; LANES],
+}
+
+/// Where the light of eight surfaces comes from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    /// Of the surfaces, in the world.
+    pub(crate) normal: DVec3x8,
+    pub(crate) to_light: DVec3x8,
+    /// Distances of the light.
+    pub(crate) ends: F64x8,
+    /// Those for which it is asked whether anything is between.
+    pub(crate) asked: Mask8,
 }
 
 /// Whether more than distances and faces is asked for: the bytes of cells, and where they were entered.
@@ -156,50 +223,54 @@ impl Octet {
 impl World {
     /// Finds the first surfaces that rays from the eye meet, among what their tile can reach.
     #[inline(always)]
-    pub(crate) fn meet_octet(
+    pub(crate) fn meet_octets(
         &self,
-        octet: &mut Octet,
+        octets: &mut [Octet; 2],
         reach: &Reach,
         (bytes, footprint): (Bytes, &Footprint),
         counts: &Counts,
     ) {
-        let rays = octet.rays;
         for (index, span) in reach.grids.iter().flatten() {
             let (index, item) = (*index, &self.items[*index as usize]);
             let layer = &item.grid.seen;
             let [begins, ends] = item.range(&self.items, footprint);
-            let Some(order) = self.walk.order().filter(|_| Packet::can(layer.size)) else {
-                self.meet_each(octet, index, span, (rays.there, [begins, ends]), counts);
+            let Some(order) = self.walk.order().filter(|_| Packet::can(layer)) else {
+                for octet in octets.iter_mut() {
+                    let there = octet.rays.there;
+                    self.meet_each(octet, index, span, (there, [begins, ends]), counts);
+                }
                 continue;
             };
             let map = &item.grid_from_world;
-            let origin = rays.origin.turned(&map.matrix3) + DVec3x8::splat(map.translation);
-            let grid_rays = GridRays::new(origin, rays.direction.turned(&map.matrix3), rays.there);
-            let (from, to) = span.eight_distances(&grid_rays);
-            // Just before the plane: where a ray is then is beyond doubt.
-            let from = (from * F64x8::splat(1.0 - 1e-9)).max(F64x8::splat(begins));
-            let to = minimum(minimum(to, octet.t), F64x8::splat(ends));
-            let mut packet = Packet::begin(&grid_rays, layer.size, &Stretch { from, to });
-            let mut hits = packet.find_marked(&grid_rays, layer, order);
-            counts.steps.set(counts.steps.get() + u64::from(packet.steps));
-            if begins > 0.0 && hits.marked != 0 {
-                let within = mask_of(hits.marked) & packet.begun_in();
-                if within.any() {
-                    for lane in (0..LANES).filter(|&lane| within.has(lane)) {
-                        hits.marked &= !(1 << lane);
+            let rays = [octets[0].rays.within(map), octets[1].rays.within(map)];
+            let mut packets = [
+                first_packet(&rays[0], span, octets[0].t, [begins, ends], layer),
+                first_packet(&rays[1], span, octets[1].t, [begins, ends], layer),
+            ];
+            let (all_hits, steps) = find_marked(&mut packets, &rays, layer, order);
+            counts.steps.set(counts.steps.get() + u64::from(steps));
+            for k in 0..2 {
+                let (octet, packet) = (&mut octets[k], &packets[k]);
+                let mut marked = all_hits[k].marked;
+                if begins > 0.0 && marked != 0 {
+                    let within = mask_of(marked) & packet.begun_in();
+                    if within.any() {
+                        for lane in (0..LANES).filter(|&lane| within.has(lane)) {
+                            marked &= !(1 << lane);
+                        }
+                        self.meet_each(octet, index, span, (within, [begins, ends]), counts);
                     }
-                    self.meet_each(octet, index, span, (within, [begins, ends]), counts);
                 }
-            }
-            if hits.marked != 0 {
-                if item.without_holes {
-                    self.take(octet, &grid_rays, &packet, index, mask_of(hits.marked), bytes);
-                } else {
-                    self.meet_each(octet, index, span, (mask_of(hits.marked), [begins, ends]), counts);
+                if marked != 0 {
+                    if item.without_holes {
+                        self.take(octet, &rays[k], packet, index, mask_of(marked), bytes);
+                    } else {
+                        self.meet_each(octet, index, span, (mask_of(marked), [begins, ends]), counts);
+                    }
                 }
-            }
-            if packet.refused.any() {
-                self.meet_each(octet, index, span, (packet.refused, [begins, ends]), counts);
+                if packet.refused.any() {
+                    self.meet_each(octet, index, span, (packet.refused, [begins, ends]), counts);
+                }
             }
         }
     }
@@ -292,65 +363,73 @@ impl World {
     /// Tells for which of some surfaces anything blocks the light from a direction, nearer than some distance; `reach`
     /// are the grids that the rays may meet, where that is known.
     #[inline(always)]
-    pub(crate) fn blocked_octet(
+    pub(crate) fn blocked_octets(
         &self,
-        octet: &Octet,
-        (normal, to_light, ends): (DVec3x8, DVec3x8, F64x8),
-        asked: Mask8,
+        octets: &[Octet; 2],
+        ways: &[Way; 2],
         reach: Option<&Reach>,
         counts: &Counts,
-    ) -> Mask8 {
-        let lifted = self.lifted(octet, normal);
+    ) -> [Mask8; 2] {
+        let mut blocked = [Mask8::NONE; 2];
+        let lifted = [self.lifted(&octets[0], ways[0].normal), self.lifted(&octets[1], ways[1].normal)];
         let (Some(reach), Some(order)) = (reach, self.walk.order()) else {
-            return self.blocked_each(octet, (lifted, to_light, ends), asked, reach, counts);
+            for k in 0..2 {
+                let view = (lifted[k], ways[k].to_light, ways[k].ends);
+                blocked[k] = self.blocked_each(&octets[k], view, ways[k].asked, reach, counts);
+            }
+            return blocked;
         };
-        let mut blocked = Mask8::NONE;
         for (index, span) in reach.grids.iter().flatten() {
             let (index, item) = (*index, &self.items[*index as usize]);
             let layer = &item.grid.blocking;
-            let open = asked & !blocked;
-            if !Packet::can(layer.size) {
-                blocked =
-                    blocked | self.blocked_by(octet, (lifted, to_light, ends), (index, span), open, counts);
+            let mut open = [ways[0].asked & !blocked[0], ways[1].asked & !blocked[1]];
+            if !Packet::can(layer) {
+                for k in 0..2 {
+                    let view = (lifted[k], ways[k].to_light, ways[k].ends);
+                    blocked[k] =
+                        blocked[k] | self.blocked_by(&octets[k], view, (index, span), open[k], counts);
+                }
                 continue;
             }
-            let mut own = Mask8::NONE;
-            for i in 0..LANES {
-                own.0[i] = if octet.item[i] == index { open.0[i] } else { 0 };
-            }
             let map = &item.grid_from_world;
-            let direction = to_light.turned(&map.matrix3);
-            for (lanes, is_own) in [(own, true), (open & !own, false)] {
-                if !lanes.any() {
+            for is_own in [true, false] {
+                let mut lanes = open;
+                for k in 0..2 {
+                    for i in 0..LANES {
+                        let is_among = (octets[k].item[i] == index) == is_own;
+                        lanes[k].0[i] = if is_among { open[k].0[i] } else { 0 };
+                    }
+                }
+                if !(lanes[0] | lanes[1]).any() {
                     continue;
                 }
-                let origin = if is_own {
-                    octet.site
-                } else {
-                    lifted.turned(&map.matrix3) + DVec3x8::splat(map.translation)
-                };
-                let rays = GridRays::new(origin, direction, lanes);
-                let to = minimum(span.eight_distances(&rays).1, ends);
-                let mut packet = if is_own {
-                    Packet::begin_in(&rays, layer.size, octet.before, to)
-                } else {
-                    Packet::begin(&rays, layer.size, &Stretch { from: F64x8::ZERO, to })
-                };
-                let hits = packet.find_marked(&rays, layer, order);
-                counts.steps.set(counts.steps.get() + u64::from(packet.steps));
-                let marked = mask_of(hits.marked);
-                let is_plain = item.without_holes;
-                let sure = if is_own { mask_of(hits.passed_empty) & !octet.began_inside } else { Mask8::ALL };
-                let mut met = marked;
-                if (marked & F64x8::splat(f64::INFINITY).above(ends)).any() {
-                    met = met & ends.above(packet.faces(&rays).t);
-                }
-                let sure = if is_plain { sure } else { Mask8::NONE };
-                blocked = blocked | (met & sure);
-                let doubtful = (met & !sure) | packet.refused;
-                if doubtful.any() {
-                    let view = (lifted, to_light, ends);
-                    blocked = blocked | self.blocked_by(octet, view, (index, span), doubtful, counts);
+                let rays = [
+                    shadow_rays(&octets[0], is_own, map, (lifted[0], ways[0].to_light), lanes[0]),
+                    shadow_rays(&octets[1], is_own, map, (lifted[1], ways[1].to_light), lanes[1]),
+                ];
+                let mut packets = [
+                    shadow_packet(&rays[0], is_own, span, (octets[0].before, ways[0].ends), layer),
+                    shadow_packet(&rays[1], is_own, span, (octets[1].before, ways[1].ends), layer),
+                ];
+                let (hits, steps) = find_marked(&mut packets, &rays, layer, order);
+                counts.steps.set(counts.steps.get() + u64::from(steps));
+                for k in 0..2 {
+                    let (octet, way) = (&octets[k], &ways[k]);
+                    let mut met = mask_of(hits[k].marked);
+                    let sure =
+                        if is_own { mask_of(hits[k].passed_empty) & !octet.began_inside } else { Mask8::ALL };
+                    if (met & F64x8::splat(f64::INFINITY).above(way.ends)).any() {
+                        met = met & way.ends.above(packets[k].faces(&rays[k]).t);
+                    }
+                    let sure = if item.without_holes { sure } else { Mask8::NONE };
+                    blocked[k] = blocked[k] | (met & sure);
+                    let doubtful = (met & !sure) | packets[k].refused;
+                    if doubtful.any() {
+                        let view = (lifted[k], way.to_light, way.ends);
+                        blocked[k] =
+                            blocked[k] | self.blocked_by(octet, view, (index, span), doubtful, counts);
+                    }
+                    open[k] = open[k] & !lanes[k];
                 }
             }
         }

@@ -5,6 +5,7 @@
 mod worlds;
 
 use super::packet::{GridRays, Order, Packet, Stretch};
+use super::steps::find_marked_in_all;
 use super::{Found, GridRay, Moment, Walk, fixed};
 use crate::grid::Chunks;
 use crate::occupancy::Values;
@@ -73,6 +74,7 @@ fn count(kind: Kind, size: [u32; 3], [width, height]: [u32; 2], wrong: &mut Wron
     let right = forward.cross(DVec3::Y).normalize_or(DVec3::X);
     let up = right.cross(forward);
     let edges = size.map(|s| s as i32);
+    let mut before: Option<(Packet, GridRays)> = None;
     for i in (0..width * height).step_by(LANES) {
         let mut directions = DVec3x8::splat(DVec3::ZERO);
         for lane in 0..LANES {
@@ -86,15 +88,15 @@ fn count(kind: Kind, size: [u32; 3], [width, height]: [u32; 2], wrong: &mut Wron
         let rays = GridRays::new(DVec3x8::splat(eye), directions, Mask8::ALL);
         let stretch = Stretch { from: F64x8::ZERO, to: F64x8::splat(f64::INFINITY) };
         let packet = Packet::begin(&rays, edges, &stretch);
+        let last = before.get_or_insert((packet, rays));
         let find = |order: Order| {
-            let (mut wide, mut plain) = (packet, packet);
-            let hits = wide.find_marked(&rays, &grid.seen, order);
-            assert_eq!(hits, plain.find_marked_plainly(&rays, &grid.seen, order));
-            let (a, b) = (wide.faces(&rays), plain.faces(&rays));
-            assert_eq!((a.cell, a.face, a.t, wide.steps), (b.cell, b.face, b.t, plain.steps));
-            (hits.marked, a.cell)
+            let mut found = packet;
+            let beside = (&last.0, &last.1);
+            let hits = find_marked_in_all((&mut found, &rays), beside, &grid.seen, order);
+            (hits.marked, found.faces(&rays).cell)
         };
         let (sure, fast) = (find(Order::Exact), find(Order::Rounded));
+        before = Some((packet, rays));
         let at = |(marked, cell): &(u32, [polyptych_core::lanes::I32x8; 3]), lane: usize| {
             (marked >> lane & 1 == 1).then(|| [cell[0].0[lane], cell[1].0[lane], cell[2].0[lane]])
         };

@@ -18,6 +18,7 @@ pub(crate) mod fixed;
 mod lanes;
 pub(crate) mod packet;
 mod rays;
+pub(crate) mod steps;
 
 #[cfg(test)]
 mod exactness;

@@ -1,4 +1,5 @@
-//! Which marked cells do eight rays meet first? The walk of [`super::Walk`], eight rays at once, in single precision.
+//! Where do eight rays begin, and how did they enter the cells that they came to? The walk of [`super::Walk`], eight rays
+//! at once, in single precision; [`super::steps`] takes its steps.
 //!
 //! Rays begin anew at a place within the grid, and so small numbers are enough. With [`Order::Exact`] each step is
 //! taken only where its outcome is beyond doubt: where the place at which a ray leaves a block lies farther from all
@@ -7,8 +8,6 @@
 //! every ray. [`Order::Rounded`] takes places as they are rounded, moved into the block: a few rays in a million then
 //! see a neighbor of their cell.
 
-use super::Walk;
-use super::lanes;
 pub(crate) use super::rays::GridRays;
 use crate::grid::Layer;
 use polyptych_core::lanes::{DVec3x8, F64x8, I32x8, LANES, Mask8};
@@ -45,31 +44,30 @@ pub(crate) struct Stretch {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Packet {
     /// Mirrored cells in which the walks begin: places are counted from them, so that near ones are told best.
-    base: [[i32; LANES]; 3],
+    pub(super) base: [[i32; LANES]; 3],
     /// Where the walks begin.
-    origin: [[f32; LANES]; 3],
-    direction: [[f32; LANES]; 3],
-    inverse: [[f32; LANES]; 3],
+    pub(super) origin: [[f32; LANES]; 3],
+    pub(super) direction: [[f32; LANES]; 3],
+    pub(super) inverse: [[f32; LANES]; 3],
     /// By how much rounding may change the distance of a plane of each axis.
-    fuzz: [[f32; LANES]; 3],
+    pub(super) fuzz: [[f32; LANES]; 3],
     /// By how much it may change a place.
-    slack: [f32; LANES],
-    flip: [[i32; LANES]; 3],
+    pub(super) slack: [f32; LANES],
+    pub(super) flip: [[i32; LANES]; 3],
     /// First mirrored cell beyond the grid.
-    end: [[i32; LANES]; 3],
-    cell: [[i32; LANES]; 3],
+    pub(super) end: [[i32; LANES]; 3],
+    pub(super) cell: [[i32; LANES]; 3],
     /// The axis along which each cell was entered, 3 where the walk began in it.
-    entered: [i32; LANES],
+    pub(super) entered: [i32; LANES],
     /// How far the walks go.
-    to: [f32; LANES],
+    pub(super) to: [f32; LANES],
     /// Distances at which they begin.
     begun: F64x8,
     /// Those that go.
-    active: Mask8,
+    pub(super) active: Mask8,
     /// Those that must be walked in double precision.
     pub(crate) refused: Mask8,
     size: [i32; 3],
-    pub(crate) steps: u32,
 }
 
 /// How eight cells were entered.
@@ -101,8 +99,8 @@ pub(crate) struct Hits {
 
 impl Packet {
     /// Tells whether rays can be walked so.
-    pub(crate) fn can(size: [i32; 3]) -> bool {
-        size.iter().all(|&edge| edge <= LONGEST)
+    pub(crate) fn can(layer: &Layer) -> bool {
+        layer.size.iter().all(|&edge| edge <= LONGEST) && layer.masks.are_counted()
     }
 
     /// Begins at stretches of rays, or later where they enter the grid; see [`Walk::begin`].
@@ -189,7 +187,6 @@ impl Packet {
             active,
             refused: Mask8::NONE,
             size,
-            steps: 0,
         };
         for a in 0..3 {
             far = far.max(rays.origin[a].abs());
@@ -221,34 +218,6 @@ impl Packet {
         packet.to = (to + doubt + doubt + to.abs() * F64x8::splat(1e-6)).round().0;
         packet.active = active;
         packet
-    }
-
-    /// Goes on to the first marked cells, those at hand included.
-    #[inline(always)]
-    pub(crate) fn find_marked(&mut self, rays: &GridRays, layer: &Layer, order: Order) -> Hits {
-        #[cfg(target_arch = "x86_64")]
-        if polyptych_core::registers::Registers::in_use() > polyptych_core::registers::Registers::Plain {
-            #[expect(
-                unsafe_code,
-                reason = "a kernel compiled for processor features can only be called so"
-            )]
-            // SAFETY: the processor has the feature that the kernel was compiled for; it was just asked.
-            return unsafe {
-                match order {
-                    Order::Exact => wide::find::<true>(self, rays, layer),
-                    Order::Rounded => wide::find::<false>(self, rays, layer),
-                }
-            };
-        }
-        self.find_marked_plainly(rays, layer, order)
-    }
-
-    /// Does the same in plain numbers.
-    pub(crate) fn find_marked_plainly(&mut self, rays: &GridRays, layer: &Layer, order: Order) -> Hits {
-        match order {
-            Order::Exact => plain::find::<true>(self, rays, layer),
-            Order::Rounded => plain::find::<false>(self, rays, layer),
-        }
     }
 
     /// Tells which walks are in the cell that they began in.
@@ -302,189 +271,4 @@ impl Packet {
         faces.point = DVec3x8 { x, y, z };
         faces
     }
-}
-
-/// Leaves an empty block in double precision; returns the cell behind it and the axis of its face. Lanes that are in
-/// doubt are few: each is taken by itself.
-#[cold]
-#[inline(never)]
-fn leave(rays: &GridRays, lanes: u32, cell: &[[i32; 8]; 3], mask: &[i32; 8], next: &mut [[i32; 8]; 4]) {
-    for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
-        let cell = [cell[0][lane], cell[1][lane], cell[2][lane]];
-        let size = [i32::MAX; 3];
-        let mut walk = Walk { ray: rays.one(lane), size, cell, t: 0.0, entered: None, steps: 0 };
-        walk.leave(mask[lane].count_ones());
-        let [x, y, z] = walk.cell;
-        let entered = walk.entered.map_or(3, |a| a as i32);
-        for (next, value) in next.iter_mut().zip([x, y, z, entered]) {
-            next[lane] = value;
-        }
-    }
-}
-
-/// The kernel, over operations that are in scope.
-macro_rules! kernel {
-    ($($feature:meta)?) => {
-        use super::{Hits, Layer, LANES, GridRays, Packet};
-        use crate::occupancy::Occupancy;
-
-        /// Returns the bits below a mask: numbers of children in their nodes, and words of the nodes.
-        $(#[$feature])?
-        #[inline]
-        fn child([x, y, z]: [Ints; 3], node: Ints) -> (Ints, Ints) {
-            let three = all(3);
-            let bit = or(or(and(x, three), rise::<2>(and(y, three))), rise::<4>(and(z, all(1))));
-            (or(rise::<1>(node), and(fall::<1>(z), all(1))), bit)
-        }
-
-        /// Tells which bits are set, and which octets around them are empty.
-        $(#[$feature])?
-        #[inline]
-        fn look(words: Ints, bit: Ints) -> (Ints, Ints) {
-            let (one, octet) = (all(1), all(Occupancy::OCTET as i32));
-            let set = equal(and(down(words, bit), one), one);
-            (set, equal(and(down(words, and(bit, all(0b0_1010))), octet), all(0)))
-        }
-
-        $(#[$feature])?
-        pub(super) fn find<const SURE: bool>(packet: &mut Packet, rays: &GridRays, layer: &Layer) -> Hits {
-            let three = |v: &[[f32; 8]; 3]| [floats(&v[0]), floats(&v[1]), floats(&v[2])];
-            let threes = |v: &[[i32; 8]; 3]| [ints(&v[0]), ints(&v[1]), ints(&v[2])];
-            let (origin, direction, inverse) = (three(&packet.origin), three(&packet.direction), three(&packet.inverse));
-            let (fuzz, slack, to) = (three(&packet.fuzz), floats(&packet.slack), floats(&packet.to));
-            let (flip, end, base) = (threes(&packet.flip), threes(&packet.end), threes(&packet.base));
-            let (mut cell, mut entered) = (threes(&packet.cell), ints(&packet.entered));
-            let (one, zero) = (all(1), all(0));
-            let (row, slab) = (all(layer.row as i32), all(layer.slab as i32));
-            let mut active = [0; LANES];
-            for i in 0..LANES {
-                active[i] = packet.active.0[i] as i32;
-            }
-            let mut left = ints(&active);
-            let mut hits = Hits::default();
-            let mut steps = 0;
-            while bits(left) != 0 {
-                // 1. Look the cells up.
-                let [x, y, z] = [xor(cell[0], flip[0]), xor(cell[1], flip[1]), xor(cell[2], flip[2])];
-                let chunk = add(fall::<6>(x), add(multiply(fall::<6>(y), row), multiply(fall::<6>(z), slab)));
-                let (top_word, top_bit) = child([fall::<4>(x), fall::<4>(y), and(fall::<4>(z), all(3))], zero);
-                let node = or(rise::<5>(top_word), top_bit);
-                let (middle_word, middle_bit) = child([fall::<2>(x), fall::<2>(y), fall::<2>(z)], node);
-                let (chunk, middle) = (apart(chunk), apart(middle_word));
-                let mut chunks = [&*layer.chunks[chunk[0] as usize]; LANES];
-                let mut words = [0; LANES];
-                for i in 0..LANES {
-                    chunks[i] = &*layer.chunks[chunk[i] as usize];
-                    words[i] = chunks[i].middle[(middle[i] & 0x7f) as usize] as i32;
-                }
-                // One less than the edge of the empty block: of 4 or 8 cells, then of 16, 32 or 64, or of 1 or 2.
-                let words = ints(&words);
-                let (reaching, wide) = look(words, middle_bit);
-                let mut mask = or(all(3), and(wide, all(4)));
-                let bare = and(equal(words, zero), left);
-                if bits(bare) != 0 {
-                    let (top, mut words, mut others) = (apart(top_word), [0; LANES], [0; LANES]);
-                    for i in 0..LANES {
-                        words[i] = chunks[i].top[(top[i] & 1) as usize] as i32;
-                        others[i] = chunks[i].top[(top[i] & 1 ^ 1) as usize] as i32;
-                    }
-                    let words = ints(&words);
-                    let (in_top, wide) = look(words, top_bit);
-                    let nothing = equal(or(words, ints(&others)), zero);
-                    let large = or(or(all(15), and(wide, all(16))), and(nothing, all(63)));
-                    mask = pick(without(bare, in_top), large, mask);
-                }
-                if bits(and(reaching, left)) != 0 {
-                    let node = or(rise::<5>(middle_word), middle_bit);
-                    let (word, bit) = child([x, y, z], node);
-                    let (word, mut words) = (apart(word), [0; LANES]);
-                    for i in 0..LANES {
-                        words[i] = chunks[i].bottom[(word[i] & 0x1fff) as usize] as i32;
-                    }
-                    let (set, wide) = look(ints(&words), bit);
-                    mask = pick(reaching, and(wide, one), mask);
-                    let marked = and(and(reaching, set), left);
-                    hits.marked |= bits(marked);
-                    left = without(left, marked);
-                    if bits(left) == 0 {
-                        break;
-                    }
-                }
-                hits.passed_empty |= bits(left);
-                steps += bits(left).count_ones();
-                // 2. Find the first of the three far planes of each block.
-                let last = [or(cell[0], mask), or(cell[1], mask), or(cell[2], mask)];
-                let far = [add(last[0], one), add(last[1], one), add(last[2], one)];
-                let [tx, ty, tz] = [
-                    times(minus(whole(subtract(far[0], base[0])), origin[0]), inverse[0]),
-                    times(minus(whole(subtract(far[1], base[1])), origin[1]), inverse[1]),
-                    times(minus(whole(subtract(far[2], base[2])), origin[2]), inverse[2]),
-                ];
-                let by_x = and(at_most(tx, ty), at_most(tx, tz));
-                let by_y = without(at_most(ty, tz), by_x);
-                let by_z = without(all(-1), or(by_x, by_y));
-                let by = [by_x, by_y, by_z];
-                let t = choose(by_x, tx, choose(by_y, ty, tz));
-                let mut axis = choose_axis(by_x, by_y);
-                let goes = and(left, at_most(t, to));
-                // 3. Find the cells behind them.
-                let blur = choose(by_x, fuzz[0], choose(by_y, fuzz[1], fuzz[2]));
-                let mut next = far;
-                let mut unsure = zero;
-                for a in 0..3 {
-                    let place = plus(origin[a], times(direction[a], t));
-                    let near = add(nearest(minus(place, splat(0.5))), base[a]);
-                    let aside = least(most(near, cell[a]), last[a]);
-                    if SURE {
-                        let within = minus(place, whole(subtract(aside, base[a])));
-                        let slack = plus(slack, times(direction[a], blur));
-                        let reached = or(less(slack, within), equal(aside, cell[a]));
-                        let kept = less(within, minus(splat(1.0), slack));
-                        unsure = or(unsure, without(goes, or(by[a], and(reached, kept))));
-                    }
-                    next[a] = pick(by[a], far[a], aside);
-                }
-                if SURE {
-                    let lanes = bits(unsure);
-                    if lanes != 0 {
-                        let mut found = [apart(next[0]), apart(next[1]), apart(next[2]), apart(axis)];
-                        let cells = [apart(cell[0]), apart(cell[1]), apart(cell[2])];
-                        super::leave(rays, lanes, &cells, &apart(mask), &mut found);
-                        for a in 0..3 {
-                            next[a] = ints(&found[a]);
-                        }
-                        axis = ints(&found[3]);
-                    }
-                }
-                // 4. Go there, unless the grid or the ray ends.
-                let within = and(below(next[0], end[0]), and(below(next[1], end[1]), below(next[2], end[2])));
-                left = and(goes, within);
-                for a in 0..3 {
-                    cell[a] = pick(left, next[a], cell[a]);
-                }
-                entered = pick(left, axis, entered);
-            }
-            packet.cell = [apart(cell[0]), apart(cell[1]), apart(cell[2])];
-            packet.entered = apart(entered);
-            packet.steps += steps;
-            hits
-        }
-
-        $(#[$feature])?
-        #[inline]
-        fn choose_axis(by_x: Ints, by_y: Ints) -> Ints {
-            pick(by_x, all(0), pick(by_y, all(1), all(2)))
-        }
-    };
-}
-
-#[cfg(target_arch = "x86_64")]
-mod wide {
-    use super::lanes::wide::*;
-    kernel!(target_feature(enable = "avx2"));
-}
-
-mod plain {
-    use super::lanes::plain::*;
-    kernel!();
 }

@@ -2,6 +2,7 @@
 //! distances, for every ray?
 
 use super::packet::{GridRays, Order, Packet, Stretch};
+use super::steps::find_marked_in_all;
 use super::*;
 use crate::grid::{Chunks, Grid};
 use crate::occupancy::Values;
@@ -372,6 +373,7 @@ fn eight_rays_of_the_worst_kinds_meet_what_each_meets_alone() {
         let grid = ready(&voxels);
         let size = DVec3::from_array(voxels.size().map(f64::from));
         let (mut hits, mut refused) = (0, 0);
+        let mut last: Option<(Packet, GridRays)> = None;
         for round in 0..4_000 {
             let mut origins = DVec3x8::splat(DVec3::ZERO);
             let mut directions = origins;
@@ -385,9 +387,11 @@ fn eight_rays_of_the_worst_kinds_meet_what_each_meets_alone() {
             let (from, to) = if round % 2 == 0 { (-1.0, f64::INFINITY) } else { (random.next(), 1.0) };
             let stretch = Stretch { from: F64x8::splat(from), to: F64x8::splat(to) };
             let mut packet = Packet::begin(&rays, grid.seen.size, &stretch);
-            let mut plain = packet;
-            let found = packet.find_marked(&rays, &grid.seen, Order::Exact);
-            assert_eq!(found, plain.find_marked_plainly(&rays, &grid.seen, Order::Exact));
+            let (other, other_rays) = last.get_or_insert((packet, rays));
+            let begun = packet;
+            let beside = (&*other, &*other_rays);
+            let found = find_marked_in_all((&mut packet, &rays), beside, &grid.seen, Order::Exact);
+            last = Some((begun, rays));
             let faces = packet.faces(&rays);
             for lane in 0..LANES {
                 let (origin, direction) = (origins.get(lane), directions.get(lane));
