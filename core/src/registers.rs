@@ -73,7 +73,8 @@ impl Registers {
 static IN_USE: AtomicU8 = AtomicU8::new(u8::MAX);
 
 /// Writes a function that calls the form of a kernel that is compiled for the widest registers in use. The kernel
-/// itself is named last; it and what it calls for every pixel must be `#[inline(always)]`.
+/// itself is named last; it and what it calls for every pixel must be `#[inline(always)]`. A kernel that AVX-512 does
+/// not make faster names two forms, and has AVX2 also where there is more.
 ///
 /// ```
 /// use polyptych_core::for_registers;
@@ -107,6 +108,25 @@ macro_rules! for_registers {
         $crate::for_registers! {
             @form [$(#[$about])*] [$seen] $name [$($life)?] [&$($of)? $self,] [$self,] [$($arg: $ty),*] [$(-> $to)?]
             [Self::$avx512] [Self::$avx2] [Self::$here] $avx512 $avx2
+        }
+    };
+    ($(#[$about:meta])* $seen:vis fn $name:ident (&$self:ident $(, $arg:ident: $ty:ty)* $(,)?)
+        $(-> $to:ty)? = $avx2:ident, $here:ident;) => {
+        $(#[$about])*
+        #[allow(unsafe_code, reason = "a kernel compiled for processor features can only be called so")]
+        $seen fn $name(&$self $(, $arg: $ty)*) $(-> $to)? {
+            #[cfg(target_arch = "x86_64")]
+            if $crate::registers::Registers::in_use() > $crate::registers::Registers::Plain {
+                // SAFETY: the processor has the features that the kernel was compiled for.
+                return unsafe { $self.$avx2($($arg),*) };
+            }
+            $self.$here($($arg),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2,bmi1,bmi2")]
+        fn $avx2(&$self $(, $arg: $ty)*) $(-> $to)? {
+            $self.$here($($arg),*)
         }
     };
     ($(#[$about:meta])* $seen:vis fn $name:ident $(<$life:lifetime>)? ($($arg:ident: $ty:ty),* $(,)?)

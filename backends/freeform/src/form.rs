@@ -155,7 +155,7 @@ impl FormBody {
     polyptych_core::for_registers! {
         /// Improves `hits` where a ray meets the form sooner.
         pub(crate) fn cast(&self, cast: Cast<'_>, rays: &[Rays], hits: &mut [Hits], scratch: &mut FormScratch)
-            = cast_512, cast_256, cast_here;
+            = cast_256, cast_here;
     }
 
     #[inline(always)]
