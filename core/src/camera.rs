@@ -360,7 +360,7 @@ mod tests {
             let camera = Camera::look_at(DVec3::new(1.0, 2.0, 5.0), DVec3::ZERO, DVec3::Y, projection);
             let view = camera.view(37, 23);
             for y in [0.5, 7.25, 22.5] {
-                let x = F64x8([0.5, 1.5, 7.75, 12.5, 18.5, 20.5, 35.5, 36.5]);
+                let x = F64x8::new([0.5, 1.5, 7.75, 12.5, 18.5, 20.5, 35.5, 36.5]);
                 let (origin, direction, there) = view.rays(x, y);
                 for i in 0..LANES {
                     let ray = view.ray(x.0[i], y);

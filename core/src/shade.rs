@@ -134,7 +134,7 @@ fn reflected(color: Vec3, diffuse: f32, shine: f32, radiance: Vec3) -> Vec3 {
 pub fn highlights(cosine: F32x8, shininess: f32) -> F32x8 {
     let zero = F32x8::splat(0.0);
     if !is_whole(shininess) {
-        return F32x8(cosine.0.map(|c| if c > 0.0 { c.powf(shininess) } else { 0.0 }));
+        return F32x8::new(cosine.0.map(|c| if c > 0.0 { c.powf(shininess) } else { 0.0 }));
     }
     let mut power = cosine.above(zero).pick(cosine, zero);
     let (mut result, mut left) = (F32x8::splat(1.0), shininess as u32);

@@ -129,7 +129,7 @@ impl Hits {
     /// Rays that met nothing up to their far ends.
     #[inline(always)]
     pub(crate) fn nothing(rays: &Rays) -> Self {
-        Self { t: rays.far, body: Mask8([Self::NOTHING; LANES]), normal: NOWHERE }
+        Self { t: rays.far, body: Mask8::new([Self::NOTHING; LANES]), normal: NOWHERE }
     }
 
     /// Tells which met something.
@@ -153,7 +153,7 @@ impl Hits {
     pub(crate) fn improve(&mut self, found: Mask8, t: F64x8, body: u32, normal: DVec3x8) {
         let nearer = found & self.t.above(t);
         self.t = F64x8::pick(nearer, t, self.t);
-        self.body = nearer.pick_bits(Mask8([body; LANES]), self.body);
+        self.body = nearer.pick_bits(Mask8::new([body; LANES]), self.body);
         self.normal = DVec3x8::pick(nearer, normal, self.normal);
     }
 }

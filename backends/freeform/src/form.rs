@@ -562,7 +562,7 @@ pub(crate) mod tests {
             (1.0, -6.0, 5.0, Some(1.0), None),
             (0.0, 0.0, 1.0, None, None),
         ];
-        let of = |pick: &dyn Fn(usize) -> f64| F64x8(std::array::from_fn(pick));
+        let of = |pick: &dyn Fn(usize) -> f64| F64x8::new(std::array::from_fn(pick));
         let parabola = Parabola { a: of(&|i| cases[i].0), b: of(&|i| cases[i].1), c: of(&|i| cases[i].2) };
         for (crossing, entry) in [(Crossing::Any, false), (Crossing::Entry, true)] {
             let (found, root) = parabola.first_root(F64x8::splat(2.0), crossing);

@@ -339,11 +339,11 @@ impl Pixels {
 
     const NOTHING: Self = Self {
         color: Self::BLACK,
-        distance: F32x8([f32::INFINITY; LANES]),
+        distance: F32x8::new([f32::INFINITY; LANES]),
         normal: Self::BLACK,
         id: Mask8::NONE,
         albedo: Self::BLACK,
-        shadow: F32x8([1.0; LANES]),
+        shadow: F32x8::new([1.0; LANES]),
     };
 
     /// Writes them into all planes that are there, as many as the row has.

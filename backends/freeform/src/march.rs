@@ -43,8 +43,11 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
-    pub(crate) const NOTHING: Self =
-        Self { color: BLACK, transparency: F32x8([1.0; LANES]), half: F64x8([f64::INFINITY; LANES]) };
+    pub(crate) const NOTHING: Self = Self {
+        color: BLACK,
+        transparency: F32x8::new([1.0; LANES]),
+        half: F64x8::new([f64::INFINITY; LANES]),
+    };
 
     /// Adds a layer in front of everything that follows on a ray.
     pub(crate) fn add(&mut self, lane: usize, color: Vec3, opacity: f32) {

@@ -62,7 +62,7 @@ struct Extent {
 
 impl Extent {
     const NONE: Self = {
-        let (top, bottom) = (F64x8([f64::INFINITY; LANES]), F64x8([f64::NEG_INFINITY; LANES]));
+        let (top, bottom) = (F64x8::new([f64::INFINITY; LANES]), F64x8::new([f64::NEG_INFINITY; LANES]));
         Self { low: DVec3x8 { x: top, y: top, z: top }, high: DVec3x8 { x: bottom, y: bottom, z: bottom } }
     };
 
@@ -90,7 +90,7 @@ impl Extent {
 /// Returns the smallest of eight numbers.
 #[inline(always)]
 fn least(v: F64x8) -> f64 {
-    let [a, b, c, d, e, f, g, h] = v.0;
+    let [a, b, c, d, e, f, g, h] = v.0.values();
     a.min(b).min(c.min(d)).min(e.min(f).min(g.min(h)))
 }
 

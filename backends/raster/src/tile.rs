@@ -201,7 +201,7 @@ impl TileBuffer {
         let wins = wins & !outside;
         let to = at + apart..at + apart + BLOCK;
         wins.pick(depth, old).store(&mut self.depth[to.clone()]);
-        self.id[to].copy_from_slice(&wins.pick_bits(Mask8([id; BLOCK]), old_ids).0);
+        self.id[to].copy_from_slice(&*wins.pick_bits(Mask8::new([id; BLOCK]), old_ids).0);
     }
 
     /// Draws a triangle with holes; `is_solid` tells for a place of the picture, asked only where it would win.

@@ -110,7 +110,7 @@ impl ScreenVertices {
         let share = F64x8::splat(1.0) / divisor;
         let (x, y) = (x * share, y * share);
         let (width, height) = (f64::from(lens.width), f64::from(lens.height));
-        let bit = |is_beyond: Mask8, border: u32| is_beyond & Mask8([border; LANES]);
+        let bit = |is_beyond: Mask8, border: u32| is_beyond & Mask8::new([border; LANES]);
         let at = F64x8::splat;
         let beyond_guard = at(-GUARD).above(x)
             | x.above(at(width + GUARD))
@@ -121,15 +121,15 @@ impl ScreenVertices {
             | bit(at(0.0).above(y), border::TOP)
             | bit(y.above(at(height)), border::BOTTOM)
             | bit(beyond_guard, border::GUARD);
-        let beyond = is_near.pick_bits(Mask8([border::NEAR; LANES]), beyond);
+        let beyond = is_near.pick_bits(Mask8::new([border::NEAR; LANES]), beyond);
         let steps = F64x8::splat(f64::from(STEPS));
         Self {
-            column: (x * steps).nearest().0,
-            row: (y * steps).nearest().0,
-            beyond: is_somewhere.pick_bits(beyond, Mask8([border::NOWHERE; LANES])).0,
-            x: x.0,
-            y: y.0,
-            depth: depth.0,
+            column: (x * steps).nearest().0.values(),
+            row: (y * steps).nearest().0.values(),
+            beyond: is_somewhere.pick_bits(beyond, Mask8::new([border::NOWHERE; LANES])).0.values(),
+            x: x.0.values(),
+            y: y.0.values(),
+            depth: depth.0.values(),
         }
     }
 }

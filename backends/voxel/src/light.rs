@@ -22,7 +22,11 @@ struct Lit {
 
 impl Lit {
     const NONE: Self = Self {
-        color: Vec3x8 { x: F32x8([0.0; LANES]), y: F32x8([0.0; LANES]), z: F32x8([0.0; LANES]) },
+        color: Vec3x8 {
+            x: F32x8::new([0.0; LANES]),
+            y: F32x8::new([0.0; LANES]),
+            z: F32x8::new([0.0; LANES]),
+        },
         shadow: [1.0; LANES],
     };
 }

@@ -178,10 +178,10 @@ impl Packet {
             inverse: [[0.0; LANES]; 3],
             fuzz: [[0.0; LANES]; 3],
             slack: [0.0; LANES],
-            flip: [rays.flip[0].0, rays.flip[1].0, rays.flip[2].0],
+            flip: [rays.flip[0].0.values(), rays.flip[1].0.values(), rays.flip[2].0.values()],
             end: [[0; LANES]; 3],
             cell: [[0; LANES]; 3],
-            entered: entered.0,
+            entered: entered.0.values(),
             to: [0.0; LANES],
             begun,
             active,
@@ -197,39 +197,39 @@ impl Packet {
         active = active & !packet.refused;
         for a in 0..3 {
             let ends = I32x8::pick(rays.flip[a].is_negative(), I32x8::splat(0), I32x8::splat(size[a]));
-            packet.end[a] = ends.0;
+            packet.end[a] = ends.0.values();
             let origin = rays.origin[a] + rays.direction[a] * begun;
             // Within the cell, so that no number is larger than the grid.
             let origin = (origin - cell[a].to_f64()).max(F64x8::ZERO).min(F64x8::splat(1.0));
             let direction = rays.direction[a] * unit;
-            packet.direction[a] = direction.round().0;
+            packet.direction[a] = direction.round().0.values();
             let still = F64x8::splat(1e-30).above(direction);
             let inverse = F64x8::pick(still, F64x8::splat(f64::INFINITY), rays.inverse[a] * longest);
-            packet.inverse[a] = inverse.round().0;
-            packet.fuzz[a] = (inverse * doubt).round().0;
+            packet.inverse[a] = inverse.round().0.values();
+            packet.fuzz[a] = (inverse * doubt).round().0.values();
             // All planes of what stands still lie at infinity.
-            packet.origin[a] = F64x8::pick(still, F64x8::splat(-1.0), origin).round().0;
+            packet.origin[a] = F64x8::pick(still, F64x8::splat(-1.0), origin).round().0.values();
             // Those that go nowhere are looked up, too: in the first cell.
-            packet.cell[a] = I32x8::pick(active, cell[a], rays.flip[a]).0;
+            packet.cell[a] = I32x8::pick(active, cell[a], rays.flip[a]).0.values();
             packet.base[a] = packet.cell[a];
         }
-        packet.slack = doubt.round().0;
+        packet.slack = doubt.round().0.values();
         let to = (to - begun) * longest;
-        packet.to = (to + doubt + doubt + to.abs() * F64x8::splat(1e-6)).round().0;
+        packet.to = (to + doubt + doubt + to.abs() * F64x8::splat(1e-6)).round().0.values();
         packet.active = active;
         packet
     }
 
     /// Tells which walks are in the cell that they began in.
     pub(crate) fn begun_in(&self) -> Mask8 {
-        I32x8(self.entered).equal(I32x8::splat(3))
+        I32x8::new(self.entered).equal(I32x8::splat(3))
     }
 
     /// Returns how the cells at hand were entered, in double precision.
     #[inline(always)]
     pub(crate) fn faces(&self, rays: &GridRays) -> Faces {
-        let mirrored = [I32x8(self.cell[0]), I32x8(self.cell[1]), I32x8(self.cell[2])];
-        let entered = I32x8(self.entered);
+        let mirrored = [I32x8::new(self.cell[0]), I32x8::new(self.cell[1]), I32x8::new(self.cell[2])];
+        let entered = I32x8::new(self.entered);
         let (one, zero) = (I32x8::splat(1), I32x8::splat(0));
         let by = [0, 1, 2].map(|a| entered.equal(I32x8::splat(a)));
         let planes = [rays.plane(0, mirrored[0]), rays.plane(1, mirrored[1]), rays.plane(2, mirrored[2])];
