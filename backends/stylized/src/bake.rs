@@ -2,16 +2,28 @@
 
 use crate::hatch::{EDGE, STEPS, Set};
 
-/// A map of a pattern that repeats, at one size.
-#[derive(Clone, Debug)]
+/// Maps of a pattern that repeats, at all its sizes.
+#[derive(Debug)]
+pub(crate) struct Maps {
+    pub(crate) levels: Vec<Level>,
+    /// Bytes from the lowest: distance and order of the nearest stroke of the first family, and of the second; those of
+    /// strokes are signed, around [`MIDDLE`]. For pictures the lowest is the threshold, and nothing else. More room
+    /// than there are texels: the lowest bits of any number are a place.
+    texels: Box<[u32; ROOM]>,
+}
+
+/// A power of two above the number of texels of all maps.
+const ROOM: usize = 1 << 17;
+
+/// One of the maps.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Level {
     /// Texels along its edge, a power of two.
     pub(crate) size: u32,
     /// Its logarithm.
     pub(crate) shift: u32,
-    /// Bytes from the lowest: distance and order of the nearest stroke of the first family, and of the second; those of
-    /// strokes are signed, around [`MIDDLE`]. For pictures the lowest is the threshold, and nothing else.
-    pub(crate) texels: Vec<u32>,
+    /// Where its texels begin.
+    pub(crate) first: u32,
 }
 
 /// What a signed distance of zero is stored as, and the steps of one in a texel.
@@ -58,27 +70,27 @@ struct Family {
 }
 
 /// Bakes one of our own sets.
-pub(crate) fn strokes(set: Set) -> Vec<Level> {
+pub(crate) fn strokes(set: Set) -> Maps {
     let families = families(set);
-    sizes()
-        .enumerate()
-        .map(|(halvings, size)| {
-            let texel = |x: u32, y: u32| {
-                let [u, v] = [x, y].map(|c| (c as f32 + 0.5) / size as f32);
-                let [first, second] = match set {
-                    Set::Dots => [0.0, 0.5].map(|shift| dot(u, v, shift, halvings as u32, size)),
-                    _ => families.map(|f| f.nearest(u, v, halvings as u32, size)),
-                };
-                first | second << 16
+    let mut maps = Maps::empty();
+    for halvings in 0..SIZES {
+        let size = EDGE >> halvings;
+        maps.push(size, |x, y, _| {
+            let [u, v] = [x, y].map(|c| (c as f32 + 0.5) / size as f32);
+            let [first, second] = match set {
+                Set::Dots => [0.0, 0.5].map(|shift| dot(u, v, shift, halvings, size)),
+                _ => families.map(|f| f.nearest(u, v, halvings, size)),
             };
-            level(size, texel)
-        })
-        .collect()
+            first | second << 16
+        });
+    }
+    maps
 }
 
 /// Bakes pictures from light to dark: each texel's threshold is that of the first picture with ink there.
-pub(crate) fn images(pictures: &[Picture], thresholds: &[f32]) -> Vec<Level> {
-    let full = level(EDGE, |x, y| {
+pub(crate) fn images(pictures: &[Picture], thresholds: &[f32]) -> Maps {
+    let mut maps = Maps::empty();
+    maps.push(EDGE, |x, y, _| {
         let [u, v] = [x, y].map(|c| (c as f32 + 0.5) / EDGE as f32);
         let mut threshold = 1.25f32;
         for (picture, own) in pictures.iter().zip(thresholds) {
@@ -88,43 +100,59 @@ pub(crate) fn images(pictures: &[Picture], thresholds: &[f32]) -> Vec<Level> {
         }
         (threshold / 1.25 * 255.0).round() as u32
     });
-    let mut all = vec![full];
-    for size in sizes().skip(1) {
-        let finer = &all[all.len() - 1];
-        let mean = |x: u32, y: u32| {
-            let at = |dx: u32, dy: u32| finer.texels[((2 * y + dy) * finer.size + 2 * x + dx) as usize];
+    for halvings in 1..SIZES {
+        let size = EDGE >> halvings;
+        maps.push(size, |x, y, finer| {
+            let at = |dx: u32, dy: u32| finer[((2 * y + dy) * 2 * size + 2 * x + dx) as usize];
             (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1) + 2) / 4
-        };
-        let next = level(size, mean);
-        all.push(next);
+        });
     }
-    all
+    maps
 }
 
-/// Sizes of the maps: down to one that holds a single stroke.
-fn sizes() -> impl Iterator<Item = u32> {
-    (0..6).map(|halvings| EDGE >> halvings)
-}
-
-fn level(size: u32, texel: impl Fn(u32, u32) -> u32) -> Level {
-    let texels = (0..size * size).map(|i| texel(i % size, i / size)).collect();
-    Level { size, shift: size.trailing_zeros(), texels }
-}
+/// How many maps there are, each half as large as the one before: down to one that holds a single stroke.
+const SIZES: u32 = 6;
 
 fn packed(texels: f32, order: u32) -> u32 {
     (texels * STEPS).clamp(0.0, 255.0).round() as u32 | order.min(7) << 8
 }
 
-impl Level {
+impl Maps {
+    fn empty() -> Self {
+        Self { levels: Vec::new(), texels: vec![0; ROOM].try_into().expect("as long") }
+    }
+
+    /// Makes the next map; a texel is made of its place and the texels of the map before.
+    fn push(&mut self, size: u32, texel: impl Fn(u32, u32, &[u32]) -> u32) {
+        let before =
+            self.levels.last().map_or(0..0, |l| l.first as usize..(l.first + l.size * l.size) as usize);
+        let (first, count) = (before.end, (size * size) as usize);
+        let (finer, own) = self.texels[before.start..first + count].split_at_mut(before.len());
+        for (i, own) in (0u32..).zip(own) {
+            *own = texel(i % size, i / size, finer);
+        }
+        self.levels.push(Level { size, shift: size.trailing_zeros(), first: first as u32 });
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        size_of_val(&*self.texels) as u64
+    }
+
+    /// Returns the texel at a place of a map, told by its row and column there.
+    #[inline(always)]
+    pub(crate) fn at(&self, level: &Level, place: u32) -> u32 {
+        self.texels[(level.first + place) as usize % ROOM]
+    }
+
     /// Returns the sums of the even bytes around a place, each times 256, and the nearest texel.
     #[inline(always)]
-    pub(crate) fn between(&self, x: f32, y: f32) -> (u32, u32) {
+    pub(crate) fn between(&self, level: &Level, x: f32, y: f32) -> (u32, u32) {
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (((x - x0) * 16.0) as u32, ((y - y0) * 16.0) as u32);
-        let mask = self.size as i32 - 1;
-        let (column, row) = (x0 as i32 & mask, (y0 as i32 & mask) << self.shift);
-        let (right, below) = ((column + 1) & mask, ((y0 as i32 + 1) & mask) << self.shift);
-        let at = |place: i32| self.texels[place as usize];
+        let mask = level.size as i32 - 1;
+        let (column, row) = (x0 as i32 & mask, (y0 as i32 & mask) << level.shift);
+        let (right, below) = ((column + 1) & mask, ((y0 as i32 + 1) & mask) << level.shift);
+        let at = |place: i32| self.at(level, place as u32);
         let corners = [at(row | column), at(row | right), at(below | column), at(below | right)];
         let weights = [(16 - fx) * (16 - fy), fx * (16 - fy), (16 - fx) * fy, fx * fy];
         // Two sums in one word, each below 2^16.
@@ -230,19 +258,19 @@ mod tests {
     #[test]
     fn maps_repeat_without_a_seam_and_halve_the_strokes() {
         for set in [Set::Pencil, Set::Ink, Set::Dots] {
-            let levels = strokes(set);
-            assert_eq!(levels.iter().map(|l| l.size).collect::<Vec<_>>(), [256, 128, 64, 32, 16, 8]);
-            for level in &levels[..4] {
+            let maps = strokes(set);
+            assert_eq!(maps.levels.iter().map(|l| l.size).collect::<Vec<_>>(), [256, 128, 64, 32, 16, 8]);
+            for level in &maps.levels[..4] {
                 // Distances change by no more than the way to the next texel, over the seam as elsewhere. Between
                 // lifted ends of strokes another may be the nearest, which is as far at that place.
                 let size = level.size;
-                let distance =
-                    |x: u32, y: u32| stored(set, level.texels[(y % size * size + x % size) as usize]);
+                let distance = |x: u32, y: u32| stored(set, maps.at(level, y % size * size + x % size));
                 let jumps =
                     (0..size).filter(|&y| (distance(size - 1, y) - distance(size, y)).abs() > 1.3).count();
                 assert!(jumps * 20 <= size as usize, "{set:?} {size}: {jumps} jumps");
-                let near = level.texels.iter().filter(|t| stored(set, **t) < 1.0).count() as f32;
-                let share = near / level.texels.len() as f32;
+                let count = size * size;
+                let near = (0..count).filter(|&i| stored(set, maps.at(level, i)) < 1.0).count() as f32;
+                let share = near / count as f32;
                 assert!((0.05..0.5).contains(&share), "{set:?} {size}: {share} is near strokes");
             }
         }
@@ -251,8 +279,8 @@ mod tests {
     #[test]
     fn a_picture_s_ink_has_its_level_s_threshold() {
         let half = |dark: u8| Picture { width: 2, height: 1, light: vec![dark, 255] };
-        let levels = images(&[half(255), half(0)], &[0.2, 0.6]);
-        let threshold = |x: usize| levels[0].texels[x] as f32 / 255.0 * 1.25;
+        let maps = images(&[half(255), half(0)], &[0.2, 0.6]);
+        let threshold = |x: u32| maps.at(&maps.levels[0], x) as f32 / 255.0 * 1.25;
         assert!((threshold(10) - 0.6).abs() < 0.01 && threshold(250) > 1.2);
     }
 }

@@ -153,37 +153,40 @@ impl Surfaces<'_> {
         let next_distances = &plane.distance()[first + step..first + step + count];
         let normals = &plane.normal()[first..first + count];
         let next_normals = &plane.normal()[first + step..first + step + count];
-        let mut passes = false;
         let is_plain = |id: u32| id == 0 || self.is_outlined(id);
-        for begin in (0..count).step_by(LANES) {
+        let mut begin = 0;
+        while begin < count {
+            // Much that is one body is passed at once.
+            let end = count.min(begin + SPAN);
             let id = ids[begin];
-            if begin % SPAN == 0 {
-                let span = begin..(begin + SPAN).min(count);
-                let differ =
-                    difference::<SPAN>(&ids[span.clone()], id) | difference::<SPAN>(&next_ids[span], id);
-                passes = differ == 0 && is_plain(id);
-            }
-            if passes {
+            let differ =
+                difference::<SPAN>(&ids[begin..end], id) | difference::<SPAN>(&next_ids[begin..end], id);
+            if differ == 0 && is_plain(id) {
+                begin = end;
                 continue;
             }
-            let all = begin..(begin + LANES).min(count);
-            let (here, next) = (&ids[all.clone()], &next_ids[all.clone()]);
-            let is_one = difference::<LANES>(here, id) | difference::<LANES>(next, id) == 0;
-            if is_one && is_plain(id) {
-                continue;
-            }
-            let cosine = self.styles.all[usize::from(self.styles.index(id))].crease_cosine;
-            let colors = if is_one { self.has_colors(id) } else { !self.colorful.is_empty() };
-            let mut unlike = [false; LANES];
-            for (i, unlike) in all.clone().zip(&mut unlike) {
-                let (near, far) = (distances[i], next_distances[i]);
-                // What is no number differs, too.
-                let alike = (near - far).abs() <= JUMP * near.min(far);
-                let turned = normals[i].dot(next_normals[i]) < cosine;
-                *unlike = (ids[i] != next_ids[i]) | ((ids[i] != 0) & (!alike | turned | colors));
-            }
-            for (i, _) in all.zip(unlike).filter(|(_, unlike)| *unlike) {
-                visit(i as u32);
+            while begin < end {
+                let all = begin..(begin + LANES).min(count);
+                begin += LANES;
+                let id = ids[all.start];
+                let (here, next) = (&ids[all.clone()], &next_ids[all.clone()]);
+                let is_one = difference::<LANES>(here, id) | difference::<LANES>(next, id) == 0;
+                if is_one && is_plain(id) {
+                    continue;
+                }
+                let cosine = self.styles.all[usize::from(self.styles.index(id))].crease_cosine;
+                let colors = if is_one { self.has_colors(id) } else { !self.colorful.is_empty() };
+                let mut unlike = [false; LANES];
+                for (i, unlike) in all.clone().zip(&mut unlike) {
+                    let (near, far) = (distances[i], next_distances[i]);
+                    // What is no number differs, too.
+                    let alike = (near - far).abs() <= JUMP * near.min(far);
+                    let turned = normals[i].dot(next_normals[i]) < cosine;
+                    *unlike = (ids[i] != next_ids[i]) | ((ids[i] != 0) & (!alike | turned | colors));
+                }
+                for (i, _) in all.zip(unlike).filter(|(_, unlike)| *unlike) {
+                    visit(i as u32);
+                }
             }
         }
     }

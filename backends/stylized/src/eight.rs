@@ -1,31 +1,81 @@
 //! What is at eight pixels of a row?
 
 use glam::Vec3;
+use polyptych_core::framebuffer::Framebuffer;
 use polyptych_core::lanes::{F32x8, LANES, Vec3x8};
 
-/// Eight pixels of a row.
+/// Eight pixels of a row, of which those beyond the picture's edge show nothing.
 #[derive(Clone, Copy)]
-pub(crate) struct Eight {
+pub(crate) struct Eight<'a> {
     pub(crate) x: u32,
     pub(crate) y: u32,
+    /// How many are within the picture.
     pub(crate) count: usize,
-    pub(crate) first: usize,
-    /// What is seen; nothing beyond the picture.
-    pub(crate) ids: [u32; LANES],
+    pub(crate) seen: Seen<'a>,
     /// Unit vectors from the eye.
     pub(crate) direction: Vec3x8,
 }
 
-/// Reads the ids of up to eight pixels; the rest show nothing.
-#[inline(always)]
-pub(crate) fn ids(from: &[u32], first: usize, count: usize) -> [u32; LANES] {
-    let mut all = [0; LANES];
-    if count == LANES {
-        all.copy_from_slice(&from[first..first + LANES]);
-    } else {
-        all[..count].copy_from_slice(&from[first..first + count]);
+/// What is seen at eight pixels. Without a plane distances and colors are zero, and all is lit.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<'a> {
+    pub(crate) ids: &'a [u32; LANES],
+    pub(crate) distance: &'a [f32; LANES],
+    pub(crate) normal: &'a [Vec3; LANES],
+    pub(crate) albedo: &'a [Vec3; LANES],
+    pub(crate) shadow: &'a [f32; LANES],
+}
+
+/// Room for the last pixels of a row that are less than eight.
+pub(crate) struct Few {
+    ids: [u32; LANES],
+    distance: [f32; LANES],
+    normal: [Vec3; LANES],
+    albedo: [Vec3; LANES],
+    shadow: [f32; LANES],
+}
+
+impl Default for Few {
+    fn default() -> Self {
+        Self { ids: [0; LANES], distance: DARK, normal: BLACK, albedo: BLACK, shadow: LIT }
     }
-    all
+}
+
+const DARK: [f32; LANES] = [0.0; LANES];
+const LIT: [f32; LANES] = [1.0; LANES];
+const BLACK: [Vec3; LANES] = [Vec3::ZERO; LANES];
+
+/// Returns up to eight values of a plane from one on, those beyond as they are in `few`; `none` without that plane.
+#[inline(always)]
+fn of<'a, T: Copy>(
+    plane: &'a [T],
+    first: usize,
+    count: usize,
+    few: &'a mut [T; LANES],
+    none: &'a [T; LANES],
+) -> &'a [T; LANES] {
+    if plane.is_empty() {
+        return none;
+    }
+    if count == LANES {
+        return plane[first..first + LANES].try_into().expect("eight");
+    }
+    few[..count].copy_from_slice(&plane[first..first + count]);
+    few
+}
+
+impl<'a> Seen<'a> {
+    /// Reads pixels of all planes: `count` of them, at most eight, from one on.
+    #[inline(always)]
+    pub(crate) fn at(visible: &'a Framebuffer, first: usize, count: usize, few: &'a mut Few) -> Self {
+        Self {
+            ids: of(visible.id(), first, count, &mut few.ids, &[0; LANES]),
+            distance: of(visible.distance(), first, count, &mut few.distance, &DARK),
+            normal: of(visible.normal(), first, count, &mut few.normal, &BLACK),
+            albedo: of(visible.albedo(), first, count, &mut few.albedo, &BLACK),
+            shadow: of(visible.shadow(), first, count, &mut few.shadow, &LIT),
+        }
+    }
 }
 
 /// Returns the bits that any of some ids has.
@@ -67,28 +117,13 @@ pub(crate) fn lacks<const N: usize>(ids: &[u32]) -> bool {
     any != 0
 }
 
-/// Reads up to eight vectors; the rest are zero.
+/// Sorts eight vectors by their axes.
 #[inline(always)]
-pub(crate) fn gather(from: &[Vec3], first: usize, count: usize) -> Vec3x8 {
+pub(crate) fn sorted(from: &[Vec3; LANES]) -> Vec3x8 {
     let mut all = Vec3x8::splat(Vec3::ZERO);
-    if count == LANES {
-        let eight: &[Vec3; LANES] = from[first..first + LANES].try_into().expect("eight vectors");
-        for (lane, v) in eight.iter().enumerate() {
-            (all.x.0[lane], all.y.0[lane], all.z.0[lane]) = (v.x, v.y, v.z);
-        }
-    } else {
-        from[first..first + count].iter().enumerate().for_each(|(lane, v)| all.set(lane, *v));
+    for (lane, v) in from.iter().enumerate() {
+        (all.x.0[lane], all.y.0[lane], all.z.0[lane]) = (v.x, v.y, v.z);
     }
-    all
-}
-
-#[inline(always)]
-pub(crate) fn numbers(from: &[f32], first: usize, count: usize) -> F32x8 {
-    if count == LANES {
-        return F32x8::load(&from[first..]);
-    }
-    let mut all = F32x8::ZERO;
-    all.0[..count].copy_from_slice(&from[first..first + count]);
     all
 }
 

@@ -9,9 +9,9 @@
 //! Source: E. Praun, H. Hoppe, M. Webb, A. Finkelstein, *Real-time hatching*, SIGGRAPH 2001, with distances in place
 //! of painted levels.
 
-use crate::bake::{self, Level, MIDDLE, SIGNED_STEPS};
+use crate::bake::{self, MIDDLE, Maps, SIGNED_STEPS};
 use glam::Vec3;
-use polyptych_core::lanes::{F32x8, LANES, Mask8};
+use polyptych_core::lanes::{F32x8, LANES};
 use polyptych_core::load::Limits;
 use polyptych_core::load::image::decode;
 use polyptych_core::seam::{Parameter, Settings};
@@ -64,7 +64,7 @@ struct Source {
 #[derive(Clone, Debug)]
 pub(crate) struct Hatching {
     source: Source,
-    levels: Arc<[Level]>,
+    maps: Arc<Maps>,
     /// Across the strokes of both families, where there are strokes.
     across: Option<[[f32; 2]; 2]>,
     pub(crate) set: Set,
@@ -120,10 +120,10 @@ impl Hatching {
         let baked = if set == Set::Images { &thresholds[..] } else { &[] };
         let source =
             Source { set, images: names.to_owned(), thresholds: baked.iter().map(|t| t.to_bits()).collect() };
-        let levels = match before.iter().find(|b| b.source == source) {
-            Some(same) => same.levels.clone(),
-            None if set == Set::Images => bake::images(&pictures(&files)?, &thresholds).into(),
-            None => bake::strokes(set).into(),
+        let maps = match before.iter().find(|b| b.source == source) {
+            Some(same) => same.maps.clone(),
+            None if set == Set::Images => Arc::new(bake::images(&pictures(&files)?, &thresholds)),
+            None => Arc::new(bake::strokes(set)),
         };
         let sticks = match settings.text(declared, "hatch.mapping") {
             "uv" => Sticks::Uv,
@@ -140,7 +140,7 @@ impl Hatching {
         };
         Ok(Some(Arc::new(Self {
             source,
-            levels,
+            maps,
             across: bake::across(set),
             set,
             sticks,
@@ -164,66 +164,51 @@ impl Hatching {
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        self.levels.iter().map(|l| l.texels.len() as u64 * 4).sum()
+        self.maps.bytes()
     }
 
-    polyptych_core::for_registers! {
-        /// Returns how much of eight pixels strokes cover, at places of the pattern (1 is its period), on so much
-        /// darkness. `density` is how many texels of the largest map a pixel is wide.
-        ///
-        /// A kernel of its own: within that which paints rows it would stand there four times, and leave that no room
-        /// in the processor's cache of instructions.
-        pub(crate) fn ink(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8
-            = ink_512, ink_256, ink_here;
-    }
-
-    #[expect(clippy::needless_range_loop, reason = "several arrays are read and written lane by lane")]
+    /// Returns how much of eight pixels strokes cover, at places of the pattern (1 is its period), on so much darkness.
+    /// `density` is how many texels of the largest map a pixel is wide.
     #[inline(always)]
-    fn ink_here(&self, u: &F32x8, v: &F32x8, density: &F32x8, darkness: &F32x8) -> F32x8 {
-        let (u, v, density, darkness) = (*u, *v, *density, *darkness);
+    pub(crate) fn ink(&self, u: F32x8, v: F32x8, density: F32x8, darkness: F32x8) -> F32x8 {
         // The exponent of the density is the map, its mantissa the way to the next one.
         let bounded = density.max(F32x8::splat(2f32.powi(-20))).min(F32x8::splat(2f32.powi(20)));
-        let (mut halvings, mut mantissa) = ([0i32; LANES], F32x8::ZERO);
-        // One operation a loop, here and below: of longer ones the compiler makes no vectors.
-        for i in 0..LANES {
-            halvings[i] = (bounded.0[i].to_bits() >> 23) as i32 - 127;
-        }
-        for i in 0..LANES {
-            mantissa.0[i] = f32::from_bits((bounded.0[i].to_bits() & 0x007f_ffff) | 0x3f80_0000);
-        }
+        let bits = bounded.0.map(f32::to_bits);
+        let halvings = bits.map(|b| (b >> 23) as i32 - 127);
+        let mantissa = F32x8::new(bits.map(|b| f32::from_bits(b & 0x007f_ffff | 0x3f80_0000)));
+        let places = Places { u, v, mantissa, darkness };
+        let mut covered = self.on_map(halvings[0], &places);
         // Neighbors mostly have one map; where they do not, each map is read for all, and each pixel takes its own.
-        let here = Places { u, v, mantissa, darkness };
-        let mut covered = F32x8::ZERO;
-        let mut least = halvings[0];
-        for i in 1..LANES {
-            least = least.min(halvings[i]);
-        }
-        loop {
-            let (mut own, mut next) = (Mask8::NONE, i32::MAX);
-            for i in 0..LANES {
-                own.0[i] = if halvings[i] == least { u32::MAX } else { 0 };
+        let mut done = 1;
+        while let Some(next) = (done..LANES).find(|&i| halvings[i] != halvings[done - 1]) {
+            if !halvings[..next].contains(&halvings[next]) {
+                let other = self.on_map(halvings[next], &places);
+                for i in next..LANES {
+                    if halvings[i] == halvings[next] {
+                        covered.0[i] = other.0[i];
+                    }
+                }
             }
-            covered = own.pick(self.at(least, &here), covered);
-            for i in 0..LANES {
-                next = next.min(if halvings[i] > least { halvings[i] } else { i32::MAX });
-            }
-            if next == i32::MAX {
-                break;
-            }
-            least = next;
+            done = next + 1;
         }
         covered
     }
 
-    /// Returns how much strokes of one map cover, that of so many halvings.
-    #[expect(clippy::needless_range_loop, reason = "several arrays are read and written lane by lane")]
+    polyptych_core::for_registers! {
+        /// Returns how much strokes of one map cover, that of so many halvings.
+        ///
+        /// A kernel of its own: within that which paints rows it would stand there several times, and leave that no
+        /// room in the processor's cache of instructions.
+        fn on_map(&self, halvings: i32, here: &Places) -> F32x8 = on_map_512, on_map_256, on_map_here;
+    }
+
     #[inline(always)]
-    fn at(&self, halvings: i32, here: &Places) -> F32x8 {
+    fn on_map_here(&self, halvings: i32, here: &Places) -> F32x8 {
         let &Places { u, v, mantissa, darkness } = here;
         let (zero, one, half) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(0.5));
         let power = |exponent: i32| f32::from_bits(((exponent + 127) as u32) << 23);
-        let last = self.levels.len() as i32 - 1;
-        let level = &self.levels[halvings.clamp(0, last) as usize];
+        let last = self.maps.levels.len() as i32 - 1;
+        let level = &self.maps.levels[halvings.clamp(0, last) as usize];
         // Beyond the smallest map strokes thin out.
         let (within, way, beyond) = if halvings > last {
             let far = mantissa * F32x8::splat(power(halvings - last));
@@ -237,86 +222,90 @@ impl Hatching {
         let scale = F32x8::splat(repeats * level.size as f32);
         let (x, y) = (u * scale, v * scale);
         let mut texels = [0u32; LANES];
-        let mut distances = [zero; 2];
-        if let Some(across) = self.across {
+        let [first, second] = if let Some(across) = &self.across {
             // Strokes are straight over a texel: what lies between its middle and the place is added.
             let (column, row) = (floor(x), floor(y));
             let (right, down) = (x - column - half, y - row - half);
-            let [columns, rows] = [column, row].map(|c| (c + F32x8::splat(WHOLE)).0);
+            let [columns, rows] = [column, row].map(|c| (c + F32x8::splat(WHOLE)).0.values());
             let (mask, shift) = (level.size - 1, level.shift);
-            let mut places = [0u32; LANES];
             for i in 0..LANES {
-                places[i] = (rows[i].to_bits() & mask) << shift | (columns[i].to_bits() & mask);
+                let place = (rows[i].to_bits() & mask) << shift | (columns[i].to_bits() & mask);
+                texels[i] = self.maps.at(level, place);
             }
-            for i in 0..LANES {
-                texels[i] = level.texels[places[i] as usize];
-            }
-            for (family, distance) in distances.iter_mut().enumerate() {
-                let mut stored = zero;
-                for i in 0..LANES {
-                    stored.0[i] = (texels[i] >> (16 * family) & 255) as i32 as f32;
-                }
-                let [a, b] = across[family].map(F32x8::splat);
-                let middle = (stored - F32x8::splat(MIDDLE)) * F32x8::splat(1.0 / SIGNED_STEPS);
-                *distance = (middle + right * a + down * b).abs();
-            }
+            [aside::<0>(&texels, right, down, &across[0]), aside::<16>(&texels, right, down, &across[1])]
         } else {
             let mut sums = [0u32; LANES];
             for i in 0..LANES {
-                (sums[i], texels[i]) = level.between(x.0[i] - 0.5, y.0[i] - 0.5);
+                (sums[i], texels[i]) = self.maps.between(level, x.0[i] - 0.5, y.0[i] - 0.5);
             }
-            for (family, distance) in distances.iter_mut().enumerate() {
-                for i in 0..LANES {
-                    distance.0[i] =
-                        (sums[i] >> (16 * family) & 0xffff) as i32 as f32 * (1.0 / (256.0 * STEPS));
-                }
-            }
-        }
-        let ramp = F32x8::splat(self.ramp);
+            let scale = F32x8::splat(1.0 / (256.0 * STEPS));
+            [bits_at::<0, 0xffff>(&sums) * scale, bits_at::<16, 0xffff>(&sums) * scale]
+        };
         if self.set == Set::Images {
-            let threshold = distances[0] * F32x8::splat(1.25 * STEPS / 255.0);
-            return ((darkness - threshold) * ramp + half).max(zero).min(one);
+            let threshold = first * F32x8::splat(1.25 * STEPS / 255.0);
+            return ((darkness - threshold) * F32x8::splat(self.ramp) + half).max(zero).min(one);
         }
-        let thickness = F32x8::splat(self.half_width) * beyond;
-        let pixels = one / within;
+        let reach = Reach { way, thickness: F32x8::splat(self.half_width) * beyond, pixels: one / within };
         let mut clear = one;
-        for (family, distance) in distances.into_iter().enumerate() {
-            if !darkness.above(F32x8::splat(self.earliest[family])).any() {
-                continue;
-            }
-            let mut order = zero;
-            for i in 0..LANES {
-                order.0[i] = (texels[i] >> (8 + 16 * family) & 7) as i32 as f32;
-            }
-            // Few orders differ: to choose among them takes less than to look each pixel's up.
-            let begins = &self.begins[family];
-            let [mut begin, mut change] = begins[0].map(F32x8::splat);
-            for (k, [begins, changes]) in (1u8..).zip(&begins[1..=self.distinct[family]]) {
-                let reaches = order.at_least(F32x8::splat(f32::from(k)));
-                begin = reaches.pick(F32x8::splat(*begins), begin);
-                change = reaches.pick(F32x8::splat(*changes), change);
-            }
-            let stays = order.at_least(one);
-            let thins = stays.pick(one, one - way);
-            let grown = ((darkness - begin - change * way) * ramp).max(zero).min(one);
-            let grown = if self.set == Set::Dots { grown.sqrt() } else { grown };
-            let reach = thickness * grown * thins;
-            // A stroke thinner than a pixel covers as much of it as it is wide.
-            let most = (reach + reach).min(one);
-            let covered = (reach + half - distance * pixels).max(zero).min(most);
-            clear = clear * (one - covered);
+        if darkness.above(F32x8::splat(self.earliest[0])).any() {
+            clear = one - self.covered(0, bits_at::<8, 7>(&texels), first, darkness, &reach);
+        }
+        if darkness.above(F32x8::splat(self.earliest[1])).any() {
+            clear = clear * (one - self.covered(1, bits_at::<24, 7>(&texels), second, darkness, &reach));
         }
         one - clear
     }
+
+    /// Returns how much strokes of one family cover, by their orders and how far their middle is, in texels.
+    #[inline(always)]
+    fn covered(&self, family: usize, order: F32x8, distance: F32x8, darkness: F32x8, reach: &Reach) -> F32x8 {
+        let &Reach { way, thickness, pixels } = reach;
+        let (zero, one, half) = (F32x8::ZERO, F32x8::splat(1.0), F32x8::splat(0.5));
+        // Few orders differ: to choose among them takes less than to look each pixel's up.
+        let begins = &self.begins[family];
+        let [mut begin, mut change] = begins[0].map(F32x8::splat);
+        for (k, [begins, changes]) in (1u8..).zip(&begins[1..=self.distinct[family]]) {
+            let reaches = order.at_least(F32x8::splat(f32::from(k)));
+            begin = reaches.pick(F32x8::splat(*begins), begin);
+            change = reaches.pick(F32x8::splat(*changes), change);
+        }
+        let stays = order.at_least(one);
+        let thins = stays.pick(one, one - way);
+        let grown = ((darkness - begin - change * way) * F32x8::splat(self.ramp)).max(zero).min(one);
+        let grown = if self.set == Set::Dots { grown.sqrt() } else { grown };
+        let reach = thickness * grown * thins;
+        // A stroke thinner than a pixel covers as much of it as it is wide.
+        let most = (reach + reach).min(one);
+        (reach + half - distance * pixels).max(zero).min(most)
+    }
+}
+
+/// What the strokes of both families at eight pixels have in common.
+struct Reach {
+    /// The way to the next map, from 0 to 1.
+    way: F32x8,
+    /// Half of a full stroke's width in pixels.
+    thickness: F32x8,
+    /// Pixels in a texel.
+    pixels: F32x8,
+}
+
+/// Returns some bits of texels as numbers.
+#[inline(always)]
+fn bits_at<const SHIFT: u32, const MASK: u32>(texels: &[u32; LANES]) -> F32x8 {
+    F32x8::new(texels.map(|t| (t >> SHIFT & MASK) as i32 as f32))
+}
+
+/// Returns how far the strokes of the family that is stored from a bit on are from places within their texels.
+#[inline(always)]
+fn aside<const SHIFT: u32>(texels: &[u32; LANES], right: F32x8, down: F32x8, across: &[f32; 2]) -> F32x8 {
+    let middle = (bits_at::<SHIFT, 255>(texels) - F32x8::splat(MIDDLE)) * F32x8::splat(1.0 / SIGNED_STEPS);
+    (middle + right * F32x8::splat(across[0]) + down * F32x8::splat(across[1])).abs()
 }
 
 #[inline(always)]
 fn floor(numbers: F32x8) -> F32x8 {
-    let mut all = F32x8::ZERO;
-    for (floor, number) in all.0.iter_mut().zip(numbers.0) {
-        *floor = number.floor();
-    }
-    all
+    F32x8::new(numbers.0.map(f32::floor))
 }
 
 /// The lowest bits of a whole number are those of its sum with this one, unless it is so large that single precision

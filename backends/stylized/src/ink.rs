@@ -81,7 +81,8 @@ impl Ink {
             let begin = row * self.stride;
             let words = &mut self.words[begin..begin + self.stride];
             // Eight pixels at a time; those that are too many are out of reach, or not shown.
-            for x in (left..right).step_by(LANES) {
+            let mut x = left;
+            while x < right {
                 let own: &mut [u16; LANES] =
                     (&mut words[x..x + LANES]).try_into().expect("a row ends with eight more words");
                 let column = I32x8::count_from(x as i32).to_f64().round() + F32x8::splat(0.5);
@@ -100,11 +101,11 @@ impl Ink {
                         share.0[lane] *= gap * 0.7;
                     }
                 }
-                for (word, share) in own.iter_mut().zip(share.0) {
-                    let share = share as i32;
+                for (word, share) in own.iter_mut().zip(share.nearest_below().0) {
                     let new = if share > 0 { share << 8 | key } else { 0 };
                     *word = (*word).max(new as u16);
                 }
+                x += LANES;
             }
         }
     }

@@ -1,6 +1,6 @@
 //! How do highlights and strokes get onto eight pixels?
 
-use crate::eight::{Eight, difference, numbers};
+use crate::eight::{Eight, Seen, difference};
 use crate::hatch::{EDGE, Hatching, Sticks};
 use crate::look::Look;
 use crate::paint::Painting;
@@ -16,12 +16,13 @@ impl Painting<'_> {
     pub(crate) fn shine(
         &self,
         style: &Style,
-        eight: &Eight,
+        eight: &Eight<'_>,
         normal: Vec3x8,
         cosine: F32x8,
         color: Vec3x8,
     ) -> Vec3x8 {
-        let Eight { x, y, count, first, ids, direction } = *eight;
+        let Eight { x, y, count, ref seen, direction } = *eight;
+        let ids = seen.ids;
         let zero = F32x8::ZERO;
         if !cosine.above(zero).any() {
             return color;
@@ -31,9 +32,9 @@ impl Painting<'_> {
         let mut strength = F32x8::splat(first_look.specular);
         let mut faint = F32x8::splat(first_look.faint);
         let mut shininess = [first_look.shininess; LANES];
-        if difference::<LANES>(&ids, ids[0]) != 0 {
-            for (lane, id) in ids.into_iter().enumerate() {
-                let look = look(id.max(1));
+        if difference::<LANES>(ids, ids[0]) != 0 {
+            for (lane, id) in ids.iter().enumerate() {
+                let look = look((*id).max(1));
                 (strength.0[lane], faint.0[lane], shininess[lane]) =
                     (look.specular, look.faint, look.shininess);
             }
@@ -42,7 +43,7 @@ impl Painting<'_> {
             return color;
         }
         let directions = if self.light.uniform.is_some() { None } else { self.view.row(y) };
-        let toward = self.toward(x as usize, y, count, directions.as_ref());
+        let toward = self.toward(x as usize, y, seen, directions.as_ref());
         let between = toward - direction;
         let half = between.dot(normal) / between.length().max(F32x8::splat(f32::MIN_POSITIVE));
         let faces = cosine.above(zero) & half.above(faint);
@@ -50,11 +51,7 @@ impl Painting<'_> {
             return color;
         }
         let power = powers(half.max(zero), &shininess);
-        let lit = if self.visible.shadow().is_empty() || !style.shadow {
-            F32x8::splat(1.0)
-        } else {
-            numbers(self.visible.shadow(), first, count)
-        };
+        let lit = if style.shadow { F32x8::new(*seen.shadow) } else { F32x8::splat(1.0) };
         let share = match style.highlight {
             Highlight::Off => return color,
             Highlight::Soft => power * strength * lit,
@@ -80,12 +77,12 @@ impl Painting<'_> {
         &self,
         hatching: &Hatching,
         style: &Style,
-        eight: &Eight,
+        eight: &Eight<'_>,
         origin: Vec3x8,
         (own, coded, normal, cosine): (Vec3x8, Vec3x8, Vec3x8, F32x8),
         color: Vec3x8,
     ) -> Vec3x8 {
-        let Eight { x, y, count, first, ids, direction } = *eight;
+        let Eight { x, y, seen: Seen { ids, distance, .. }, direction, .. } = *eight;
         let (one, half) = (F32x8::splat(1.0), F32x8::splat(0.5));
         let mut light = (one + cosine) * half;
         if hatching.texture > 0.0 {
@@ -102,19 +99,19 @@ impl Painting<'_> {
             let scale = F32x8::splat(1.0 / (EDGE as f32 * hatching.scale));
             let u = I32x8::count_from(x as i32).to_f64().round() * scale;
             let v = F32x8::splat(y as f32) * scale;
-            ink = hatching.ink(&u, &v, &F32x8::splat(1.0 / hatching.scale), &darkness);
+            ink = hatching.ink(u, v, F32x8::splat(1.0 / hatching.scale), darkness);
         } else {
-            let distance = numbers(self.visible.distance(), first, count);
+            let distance = F32x8::new(*distance);
             let place = origin + direction.scaled(distance);
             let pixel = self.view.pixel_size(1.0) as f32;
             let is_parallel = matches!(self.camera.projection, Projection::Orthographic { .. });
             let pixels = if is_parallel { F32x8::splat(pixel) } else { distance * F32x8::splat(pixel) };
             let mut lane = 0;
             // Run by run of one object.
-            while lane < count {
+            while lane < LANES {
                 let id = ids[lane];
-                let mut end = lane + 1;
-                while end < count && ids[end] == id {
+                let mut end = if difference::<LANES>(ids, id) == 0 { LANES } else { lane + 1 };
+                while end < LANES && ids[end] == id {
                     end += 1;
                 }
                 let index = (id.wrapping_sub(1) as usize).min(self.looks.len() - 1);
@@ -171,7 +168,7 @@ impl Run<'_> {
                     density.0[lane] = change * EDGE as f32;
                 }
             }
-            covered = hatching.ink(&u, &v, &density, &darkness);
+            covered = hatching.ink(u, v, density, darkness);
         } else {
             let p = turned(&look.pattern, place) + Vec3x8::splat(look.eye);
             let n = turned(&look.turn, normal);
@@ -188,13 +185,13 @@ impl Run<'_> {
             let is_x = weights[0].at_least(most);
             let is_y = weights[1].at_least(most) & !is_x;
             let [u, v] = planes.across(is_x, is_y);
-            covered = hatching.ink(&u, &v, &texels, &darkness) * (F32x8::splat(1.0) - mix);
+            covered = hatching.ink(u, v, texels, darkness) * (F32x8::splat(1.0) - mix);
             if mix.above(zero).any() {
                 // Neither that axis nor the one that it faces least.
                 let is_x = !is_x & !least.at_least(weights[0]);
                 let is_y = !is_y & !least.at_least(weights[1]);
                 let [u, v] = planes.across(is_x, is_y);
-                covered = covered + hatching.ink(&u, &v, &texels, &darkness) * mix;
+                covered = covered + hatching.ink(u, v, texels, darkness) * mix;
             }
         }
         if lanes.len() == LANES {

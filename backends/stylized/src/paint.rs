@@ -1,6 +1,6 @@
 //! From visible surfaces to colors: tone, highlights, strokes, paper, and lines on top, row by row.
 
-use crate::eight::{Eight, gather, ids, lacks, numbers, steepness, union};
+use crate::eight::{Eight, Few, Seen, lacks, sorted, steepness, union};
 use crate::ink::{Ink, Sheaf};
 use crate::light::Lighting;
 use crate::look::Look;
@@ -104,41 +104,51 @@ impl Painting<'_> {
         let row = y as usize * width;
         let ids = &self.visible.id()[row..row + width];
         let directions = self.view.row(y);
-        let (mut is_empty, mut is_full) = (false, false);
-        for x in (0..width).step_by(LANES) {
-            let count = (width - x).min(LANES);
-            if x % SPAN == 0 {
-                let span = &ids[x..width.min(x + SPAN)];
-                (is_empty, is_full) = (union::<SPAN>(span) == 0, !lacks::<SPAN>(span));
-            }
-            let out = &mut facing[LANES + x..LANES + x + LANES];
-            if is_empty || !is_full && union::<LANES>(&ids[x..x + count]) == 0 {
-                out.fill(0.0);
+        let (mut x, mut few) = (0, Few::default());
+        while x < width {
+            // Where there is nothing, many columns are passed at once.
+            let end = width.min(x + SPAN);
+            let span = &ids[x..end];
+            if union::<SPAN>(span) == 0 {
+                facing[LANES + x..LANES + end.next_multiple_of(LANES)].fill(0.0);
+                x = end;
                 continue;
             }
-            let normal = gather(self.visible.normal(), row + x, count);
-            let toward = self.toward(x, y, count, directions.as_ref());
-            let cosine = normal.dot(toward);
-            let bounded = cosine.max(F32x8::splat(-1.0)).min(F32x8::splat(1.0));
-            let shaded = if self.visible.shadow().is_empty() {
-                bounded
-            } else {
-                // A style without shadows has them where nothing is darker.
-                let depth_of = |s: &Style| if s.shadow { s.shadow_depth } else { f32::INFINITY };
-                let mut depth = F32x8::splat(depth_of(&self.styles.all[0]));
-                if self.styles.all.len() > 1 {
-                    for lane in 0..count {
-                        let style = usize::from(self.styles.index(ids[x + lane]));
-                        depth.0[lane] = depth_of(&self.styles.all[style]);
-                    }
+            let is_full = !lacks::<SPAN>(span);
+            while x < end {
+                let count = (width - x).min(LANES);
+                let out = &mut facing[LANES + x..LANES + x + LANES];
+                let seen = Seen::at(self.visible, row + x, count, &mut few);
+                if !is_full && union::<LANES>(seen.ids) == 0 {
+                    out.fill(0.0);
+                } else {
+                    self.cosines(x, y, &seen, directions.as_ref()).store(out);
                 }
-                let lit = numbers(self.visible.shadow(), row + x, count);
-                bounded.above(depth).pick(depth + (bounded - depth) * lit, bounded)
-            };
-            shaded.finite().store(out);
+                x += LANES;
+            }
         }
         facing[LANES - 1] = facing[LANES];
         facing[LANES + width] = facing[LANES + width - 1];
+    }
+
+    /// Reckons the cosines to the light of eight pixels, shadows included.
+    #[inline(always)]
+    fn cosines(&self, x: usize, y: u32, seen: &Seen<'_>, directions: Option<&RowDirections>) -> F32x8 {
+        let toward = self.toward(x, y, seen, directions);
+        let bounded = sorted(seen.normal).dot(toward).max(F32x8::splat(-1.0)).min(F32x8::splat(1.0));
+        if self.visible.shadow().is_empty() {
+            return bounded.finite();
+        }
+        // A style without shadows has them where nothing is darker.
+        let depth_of = |s: &Style| if s.shadow { s.shadow_depth } else { f32::INFINITY };
+        let mut depth = F32x8::splat(depth_of(&self.styles.all[0]));
+        if self.styles.all.len() > 1 {
+            for (depth, id) in depth.0.iter_mut().zip(seen.ids) {
+                *depth = depth_of(&self.styles.all[usize::from(self.styles.index(*id))]);
+            }
+        }
+        let lit = F32x8::new(*seen.shadow);
+        bounded.above(depth).pick(depth + (bounded - depth) * lit, bounded).finite()
     }
 
     /// Returns the directions to the light of eight pixels.
@@ -147,24 +157,23 @@ impl Painting<'_> {
         &self,
         x: usize,
         y: u32,
-        count: usize,
+        seen: &Seen<'_>,
         directions: Option<&RowDirections>,
     ) -> Vec3x8 {
         if let Some(uniform) = self.light.uniform {
             return Vec3x8::splat(uniform);
         }
         let mut all = Vec3x8::splat(Vec3::Y);
-        for lane in 0..count {
+        for (lane, &distance) in seen.distance.iter().enumerate() {
             let column = (x + lane) as u32;
             let ray = || self.view.ray(f64::from(column) + 0.5, f64::from(y) + 0.5);
             let to_eye = || match directions {
                 Some(directions) => -directions.at(column),
                 None => ray().map_or(Vec3::Y, |r| -r.direction.as_vec3()),
             };
-            let at = y as usize * self.visible.width() as usize + column as usize;
-            let position = || match self.visible.distance().get(at) {
-                Some(&distance) => ray().map_or(DVec3::ZERO, |r| r.at(f64::from(distance))),
-                None => DVec3::ZERO,
+            let position = || match self.visible.distance().is_empty() {
+                false => ray().map_or(DVec3::ZERO, |r| r.at(f64::from(distance))),
+                true => DVec3::ZERO,
             };
             all.set(lane, self.light.toward(position, to_eye));
         }
@@ -178,46 +187,60 @@ impl Painting<'_> {
         let directions = self.view.row(y);
         let paper = &self.styles.all[0].paper;
         let row = y as usize * width;
-        let seen = &self.visible.id()[row..row + width];
-        let (mut is_empty, mut is_full) = (false, false);
-        for x in (0..width).step_by(LANES) {
-            if x % SPAN == 0 {
-                let span = x..width.min(x + SPAN);
-                let ids = &seen[span.clone()];
-                (is_empty, is_full) = (union::<SPAN>(ids) == 0, !lacks::<SPAN>(ids));
-                if !is_full {
-                    self.ground(paper, x as u32, y, directions.as_ref(), &mut colors[span]);
-                }
+        let ids = &self.visible.id()[row..row + width];
+        let (mut x, mut few) = (0, Few::default());
+        while x < width {
+            let end = width.min(x + SPAN);
+            let span = &ids[x..end];
+            let (is_empty, is_full) = (union::<SPAN>(span) == 0, !lacks::<SPAN>(span));
+            if !is_full {
+                self.ground(paper, x as u32, y, directions.as_ref(), &mut colors[x..end]);
             }
             if is_empty {
+                x = end;
                 continue;
             }
-            let count = (width - x).min(LANES);
-            let own_ids = ids(seen, x, count);
-            if !is_full && union::<LANES>(&own_ids) == 0 {
-                continue;
-            }
-            let (direction, origin) = self.rays(x, y, directions.as_ref());
-            let eight = Eight { x: x as u32, y, count, first: row + x, ids: own_ids, direction };
-            let around = [own + LANES + x, stride];
-            let out = &mut colors[x..x + count];
-            // Mostly one style paints all; where there are several, each paints its own pixels.
-            let is_whole = self.styles.all.len() == 1 && (is_full || !lacks::<LANES>(&own_ids));
-            for (index, style) in (0u8..).zip(&self.styles.all) {
-                let is_own = |id: u32| id != 0 && self.styles.index(id) == index;
-                if !is_whole && !own_ids.into_iter().any(is_own) {
-                    continue;
+            while x < end {
+                let count = (width - x).min(LANES);
+                let seen = Seen::at(self.visible, row + x, count, &mut few);
+                if is_full || union::<LANES>(seen.ids) != 0 {
+                    let (direction, origin) = self.rays(x, y, directions.as_ref());
+                    let eight = Eight { x: x as u32, y, count, seen, direction };
+                    let around = [own + LANES + x, stride];
+                    self.paint(&eight, is_full, origin, around, facing, &mut colors[x..x + count]);
                 }
-                let result = self.eight(style, &eight, origin, around, facing);
-                if let (true, Ok(out)) = (is_whole, <&mut [Vec3; LANES]>::try_from(&mut *out)) {
-                    for (lane, color) in out.iter_mut().enumerate() {
+                x += LANES;
+            }
+        }
+    }
+
+    /// Paints eight pixels, each in its style. `is_full` tells that there is something in each.
+    #[inline(always)]
+    fn paint(
+        &self,
+        eight: &Eight<'_>,
+        is_full: bool,
+        origin: Vec3x8,
+        around: [usize; 2],
+        facing: &[f32],
+        out: &mut [Vec3],
+    ) {
+        // Mostly one style paints all; where there are several, each paints its own pixels.
+        let is_whole = self.styles.all.len() == 1 && (is_full || !lacks::<LANES>(eight.seen.ids));
+        for (index, style) in (0u8..).zip(&self.styles.all) {
+            let is_own = |id: u32| id != 0 && self.styles.index(id) == index;
+            if !is_whole && !eight.seen.ids.iter().copied().any(is_own) {
+                continue;
+            }
+            let result = self.eight(style, eight, origin, around, facing);
+            if let (true, Ok(out)) = (is_whole, <&mut [Vec3; LANES]>::try_from(&mut *out)) {
+                for (lane, color) in out.iter_mut().enumerate() {
+                    *color = result.get(lane);
+                }
+            } else {
+                for (lane, (color, id)) in out.iter_mut().zip(eight.seen.ids).enumerate() {
+                    if is_own(*id) {
                         *color = result.get(lane);
-                    }
-                } else {
-                    for (lane, (color, id)) in out.iter_mut().zip(own_ids).enumerate() {
-                        if is_own(id) {
-                            *color = result.get(lane);
-                        }
                     }
                 }
             }
@@ -272,7 +295,7 @@ impl Painting<'_> {
     fn eight(
         &self,
         style: &Style,
-        eight: &Eight,
+        eight: &Eight<'_>,
         origin: Vec3x8,
         [at, stride]: [usize; 2],
         facing: &[f32],
@@ -280,12 +303,9 @@ impl Painting<'_> {
         if style.show != Show::Style {
             return self.study(style.show, eight);
         }
-        let Eight { count, first, ids, .. } = *eight;
-        let mut own = gather(self.visible.albedo(), first, count);
-        let coded = own;
-        if self.any_coded && ids.iter().any(|&id| self.look(id).is_coded) {
-            self.decode(eight, &mut own);
-        }
+        let coded = sorted(eight.seen.albedo);
+        let is_coded = self.any_coded && eight.seen.ids.iter().any(|&id| self.look(id).is_coded);
+        let own = if is_coded { self.decode(eight) } else { coded };
         let cosine = F32x8::load(&facing[at..]);
         let slope = if style.tone.steps > 1 {
             // On the smooth side: next to another surface or a shadow the other difference says nothing.
@@ -297,11 +317,7 @@ impl Painting<'_> {
         };
         let mut color = style.tone.colors(own, cosine, slope);
         let takes_normal = style.highlight != Highlight::Off || style.hatching.is_some();
-        let normal = if takes_normal {
-            gather(self.visible.normal(), first, count)
-        } else {
-            Vec3x8::splat(Vec3::ZERO)
-        };
+        let normal = if takes_normal { sorted(eight.seen.normal) } else { Vec3x8::splat(Vec3::ZERO) };
         if style.highlight != Highlight::Off {
             color = self.shine(style, eight, normal, cosine, color);
         }
@@ -315,8 +331,7 @@ impl Painting<'_> {
             color = color.scaled(shade);
         }
         if self.scene.environment.fog.is_some() {
-            for lane in 0..count {
-                let distance = self.visible.distance().get(first + lane).copied().unwrap_or(0.0);
+            for (lane, &distance) in eight.seen.distance.iter().enumerate() {
                 color.set(lane, fogged(&self.scene.environment, color.get(lane), f64::from(distance)));
             }
         }
@@ -325,14 +340,13 @@ impl Painting<'_> {
 
     /// Shows distance or normal.
     #[inline(always)]
-    fn study(&self, show: Show, eight: &Eight) -> Vec3x8 {
+    fn study(&self, show: Show, eight: &Eight<'_>) -> Vec3x8 {
         let half = Vec3x8::splat(Vec3::splat(0.5));
         if show == Show::Normals {
-            let normal = gather(self.visible.normal(), eight.first, eight.count);
-            return normal.scaled(F32x8::splat(0.5)) + half;
+            return sorted(eight.seen.normal).scaled(F32x8::splat(0.5)) + half;
         }
         let [near, far] = self.depths;
-        let distance = numbers(self.visible.distance(), eight.first, eight.count);
+        let distance = F32x8::new(*eight.seen.distance);
         let part = (distance - F32x8::splat(near)) / F32x8::splat((far - near).max(f32::MIN_POSITIVE));
         let light = F32x8::splat(1.0) - part.max(F32x8::ZERO).min(F32x8::splat(1.0)) * F32x8::splat(0.9);
         Vec3x8 { x: light, y: light, z: light }.finite()
@@ -344,10 +358,11 @@ impl Painting<'_> {
     }
 
     /// Reads the colors of surfaces whose color channel holds texture coordinates.
-    fn decode(&self, eight: &Eight, own: &mut Vec3x8) {
-        let coordinates = *own;
+    fn decode(&self, eight: &Eight<'_>) -> Vec3x8 {
+        let coordinates = sorted(eight.seen.albedo);
+        let mut own = coordinates;
         for lane in 0..eight.count {
-            let id = eight.ids[lane];
+            let id = eight.seen.ids[lane];
             if !self.look(id).is_coded {
                 continue;
             }
@@ -363,5 +378,6 @@ impl Painting<'_> {
             let color = self.scene.base_color(material, Some([here.x, here.y]), Vec3::ZERO, Vec3::Y, lod).0;
             own.set(lane, color);
         }
+        own
     }
 }

@@ -32,12 +32,11 @@ impl Veil {
             let right = (left + TILE).min(width);
             let mut most = F32x8::ZERO;
             for y in top..(top + TILE).min(height) {
-                let row = &distances[y * width + left..y * width + right];
-                let whole = row.len() - row.len() % LANES;
-                for x in (0..whole).step_by(LANES) {
-                    most = most.max(F32x8::load(&row[x..]));
+                let (eights, rest) = distances[y * width + left..y * width + right].as_chunks::<LANES>();
+                for eight in eights {
+                    most = most.max(F32x8::new(*eight));
                 }
-                for distance in &row[whole..] {
+                for distance in rest {
                     most.0[0] = most.0[0].max(*distance);
                 }
             }
