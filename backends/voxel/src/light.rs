@@ -32,6 +32,7 @@ impl Lit {
 }
 
 /// The light of a lamp at eight points.
+#[derive(Clone, Copy)]
 struct Arriving {
     /// Where it comes from, and which points ask whether anything is between.
     way: Way,
@@ -39,6 +40,22 @@ struct Arriving {
     /// Where the lamp shines at all.
     arrives: Mask8,
 }
+
+impl Arriving {
+    const NONE: Self = Self {
+        way: Way {
+            normal: NOWHERE,
+            to_light: NOWHERE,
+            ends: F64x8::new([f64::INFINITY; LANES]),
+            asked: Mask8::NONE,
+        },
+        share: Lit::NONE.color,
+        arrives: Mask8::NONE,
+    };
+}
+
+/// Zero for each of eight points.
+const NOWHERE: DVec3x8 = DVec3x8 { x: F64x8::ZERO, y: F64x8::ZERO, z: F64x8::ZERO };
 
 /// What is known of eight points before they are lit.
 struct Points<'a> {
@@ -216,11 +233,11 @@ impl Tracer<'_> {
             return lit;
         }
         let (mut casting, mut reaching) = ([[0u32; LANES]; 2], [[0u32; LANES]; 2]);
+        let mut arriving = [Arriving::NONE; 2];
         for (index, lamp) in self.world.lamps.iter().enumerate() {
-            let arriving = [
-                self.arriving(lamp, &octets[0], &points[0], asked[0], wants),
-                self.arriving(lamp, &octets[1], &points[1], asked[1], wants),
-            ];
+            for k in 0..2 {
+                arriving[k] = self.arriving(lamp, &octets[k], &points[k], asked[k], wants);
+            }
             let mut reaches = [arriving[0].way.asked, arriving[1].way.asked];
             let reach = lights.get(index).and_then(Option::as_ref);
             if lamp.is_blocked && self.shadows == Shadows::Hard && (reaches[0] | reaches[1]).any() {

@@ -4,7 +4,6 @@
 //! holes, a ray that began in a cell, a grid too long for single precision) is asked of them, ray by ray.
 
 use crate::beam::Span;
-use crate::grid::Layer;
 use crate::levels::Footprint;
 use crate::walk::packet::{GridRays, Packet, Stretch};
 use crate::walk::steps::find_marked;
@@ -40,14 +39,13 @@ impl Rays {
     }
 }
 
-/// Begins where rays of the eye may meet something first: between two distances, and nearer than what they met before.
+/// Where rays of the eye may meet something first: between two distances, and nearer than what they met before.
 #[inline(always)]
-fn first_packet(rays: &GridRays, span: &Span, met: F64x8, [begins, ends]: [f64; 2], layer: &Layer) -> Packet {
+fn first_stretch(rays: &GridRays, span: &Span, met: F64x8, [begins, ends]: [f64; 2]) -> Stretch {
     let (from, to) = span.eight_distances(rays);
     // Just before the plane: where a ray is then is beyond doubt.
     let from = (from * F64x8::splat(1.0 - 1e-9)).max(F64x8::splat(begins));
-    let to = minimum(minimum(to, met), F64x8::splat(ends));
-    Packet::begin(rays, layer.size, &Stretch { from, to })
+    Stretch { from, to: minimum(minimum(to, met), F64x8::splat(ends)) }
 }
 
 /// Moves rays toward a light into the space of a grid: from its own surfaces, or from above those of others.
@@ -59,28 +57,11 @@ fn shadow_rays(
     (lifted, to_light): (DVec3x8, DVec3x8),
     there: Mask8,
 ) -> GridRays {
-    if is_own {
-        GridRays::new(octet.site, to_light.turned(&map.matrix3), there)
-    } else {
-        Rays { origin: lifted, direction: to_light, there }.within(map)
+    let mut origin = octet.site;
+    if !is_own {
+        origin = lifted.turned(&map.matrix3) + DVec3x8::splat(map.translation);
     }
-}
-
-/// Begins where they may meet something first.
-#[inline(always)]
-fn shadow_packet(
-    rays: &GridRays,
-    is_own: bool,
-    span: &Span,
-    (before, ends): ([I32x8; 3], F64x8),
-    layer: &Layer,
-) -> Packet {
-    let to = minimum(span.eight_distances(rays).1, ends);
-    if is_own {
-        Packet::begin_in(rays, layer.size, before, to)
-    } else {
-        Packet::begin(rays, layer.size, &Stretch { from: F64x8::ZERO, to })
-    }
+    GridRays::new(origin, to_light.turned(&map.matrix3), there)
 }
 
 /// Eight pixels and the surfaces that they see first.
@@ -230,6 +211,8 @@ impl World {
         (bytes, footprint): (Bytes, &Footprint),
         counts: &Counts,
     ) {
+        // Loops of two, not two calls: what is inlined twice is compiled twice.
+        let (mut rays, mut packets) = ([GridRays::NOWHERE; 2], [Packet::NOWHERE; 2]);
         for (index, span) in reach.grids.iter().flatten() {
             let (index, item) = (*index, &self.items[*index as usize]);
             let layer = &item.grid.seen;
@@ -242,11 +225,11 @@ impl World {
                 continue;
             };
             let map = &item.grid_from_world;
-            let rays = [octets[0].rays.within(map), octets[1].rays.within(map)];
-            let mut packets = [
-                first_packet(&rays[0], span, octets[0].t, [begins, ends], layer),
-                first_packet(&rays[1], span, octets[1].t, [begins, ends], layer),
-            ];
+            for k in 0..2 {
+                rays[k] = octets[k].rays.within(map);
+                let stretch = first_stretch(&rays[k], span, octets[k].t, [begins, ends]);
+                packets[k] = Packet::begin(&rays[k], layer.size, None, &stretch);
+            }
             let (all_hits, steps) = find_marked(&mut packets, &rays, layer, order);
             counts.steps.set(counts.steps.get() + u64::from(steps));
             for k in 0..2 {
@@ -371,7 +354,10 @@ impl World {
         counts: &Counts,
     ) -> [Mask8; 2] {
         let mut blocked = [Mask8::NONE; 2];
-        let lifted = [self.lifted(&octets[0], ways[0].normal), self.lifted(&octets[1], ways[1].normal)];
+        let mut lifted = [ways[0].normal; 2];
+        for k in 0..2 {
+            lifted[k] = self.lifted(&octets[k], ways[k].normal);
+        }
         let (Some(reach), Some(order)) = (reach, self.walk.order()) else {
             for k in 0..2 {
                 let view = (lifted[k], ways[k].to_light, ways[k].ends);
@@ -379,6 +365,7 @@ impl World {
             }
             return blocked;
         };
+        let (mut rays, mut packets) = ([GridRays::NOWHERE; 2], [Packet::NOWHERE; 2]);
         for (index, span) in reach.grids.iter().flatten() {
             let (index, item) = (*index, &self.items[*index as usize]);
             let layer = &item.grid.blocking;
@@ -403,14 +390,14 @@ impl World {
                 if !(lanes[0] | lanes[1]).any() {
                     continue;
                 }
-                let rays = [
-                    shadow_rays(&octets[0], is_own, map, (lifted[0], ways[0].to_light), lanes[0]),
-                    shadow_rays(&octets[1], is_own, map, (lifted[1], ways[1].to_light), lanes[1]),
-                ];
-                let mut packets = [
-                    shadow_packet(&rays[0], is_own, span, (octets[0].before, ways[0].ends), layer),
-                    shadow_packet(&rays[1], is_own, span, (octets[1].before, ways[1].ends), layer),
-                ];
+                for k in 0..2 {
+                    let way = &ways[k];
+                    rays[k] = shadow_rays(&octets[k], is_own, map, (lifted[k], way.to_light), lanes[k]);
+                    let to = minimum(span.eight_distances(&rays[k]).1, way.ends);
+                    let known = is_own.then_some(octets[k].before);
+                    packets[k] =
+                        Packet::begin(&rays[k], layer.size, known, &Stretch { from: F64x8::ZERO, to });
+                }
                 let (hits, steps) = find_marked(&mut packets, &rays, layer, order);
                 counts.steps.set(counts.steps.get() + u64::from(steps));
                 for k in 0..2 {

@@ -48,7 +48,6 @@ impl Tracer<'_> {
     }
 
     /// Does the same where the first surface is known; `lights` tell for some lamps what shadow rays may meet.
-    #[inline(always)]
     pub(crate) fn color(&self, ray: &Ray, met: Option<Met>, lights: &[Option<Reach>], wants: Wants) -> Pixel {
         if let Some(met) = met {
             let point = self.world.point(ray, &met);

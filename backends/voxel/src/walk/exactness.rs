@@ -87,7 +87,7 @@ fn count(kind: Kind, size: [u32; 3], [width, height]: [u32; 2], wrong: &mut Wron
         }
         let rays = GridRays::new(DVec3x8::splat(eye), directions, Mask8::ALL);
         let stretch = Stretch { from: F64x8::ZERO, to: F64x8::splat(f64::INFINITY) };
-        let packet = Packet::begin(&rays, edges, &stretch);
+        let packet = Packet::begin(&rays, edges, None, &stretch);
         let last = before.get_or_insert((packet, rays));
         let find = |order: Order| {
             let mut found = packet;

@@ -40,6 +40,54 @@ pub(crate) struct Stretch {
     pub(crate) to: F64x8,
 }
 
+/// Where eight walks begin.
+struct Place {
+    /// Mirrored.
+    cell: [I32x8; 3],
+    /// See [`Packet::entered`].
+    entered: I32x8,
+    /// Distances.
+    begun: F64x8,
+    /// Those that are in the grid.
+    active: Mask8,
+}
+
+impl Place {
+    /// Moves to where rays enter the grid; `late` are those that begin behind their origins.
+    #[inline(always)]
+    fn enter(&mut self, rays: &GridRays, size: [i32; 3], late: Mask8) {
+        let (zero, mut start, mut active) = (F64x8::ZERO, self.begun, self.active);
+        let mut axis = I32x8::pick(late, I32x8::splat(0), I32x8::splat(3));
+        let mut entered = I32x8::splat(3);
+        let low = |a: usize| rays.flip[a] & I32x8::splat(-size[a]);
+        for (a, &edge) in size.iter().enumerate() {
+            let this = I32x8::splat(a as i32);
+            let t = rays.plane(a, low(a));
+            let passed = start.above(t) | (t.equal(start) & this.below(axis));
+            let enters = !(passed | rays.still[a]);
+            start = F64x8::pick(enters, t, start);
+            axis = I32x8::pick(enters, this, axis);
+            entered = I32x8::pick(enters, this, entered);
+            let (place, last) = (rays.place[a], F64x8::splat(f64::from(edge)));
+            active = active & (!rays.still[a] | (place.at_least(zero) & last.at_least(place)));
+        }
+        active = active & F64x8::splat(f64::INFINITY).above(start);
+        for (a, &edge) in size.iter().enumerate() {
+            let this = I32x8::splat(a as i32);
+            let last = low(a) + I32x8::splat(edge - 1);
+            let t = rays.plane(a, last + I32x8::splat(1));
+            let left = start.above(t) | (t.equal(start) & this.below(axis));
+            active = active & (rays.still[a] | !left);
+            let moving = rays.cell_at(a, low(a), last, start, axis, active);
+            let moving = I32x8::pick(entered.equal(this), low(a), moving);
+            // The last cell holds both of its faces, so that a ray in the border of the grid is in it.
+            let still = rays.place[a].nearest_below().min(I32x8::splat(edge - 1));
+            self.cell[a] = I32x8::pick(rays.still[a], still, moving);
+        }
+        (self.entered, self.begun, self.active) = (entered, start, active);
+    }
+}
+
 /// Eight walks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Packet {
@@ -98,72 +146,65 @@ pub(crate) struct Hits {
 }
 
 impl Packet {
+    /// Walks that go nowhere.
+    pub(crate) const NOWHERE: Self = Self {
+        base: [[0; LANES]; 3],
+        origin: [[0.0; LANES]; 3],
+        direction: [[0.0; LANES]; 3],
+        inverse: [[0.0; LANES]; 3],
+        fuzz: [[0.0; LANES]; 3],
+        slack: [0.0; LANES],
+        flip: [[0; LANES]; 3],
+        end: [[0; LANES]; 3],
+        cell: [[0; LANES]; 3],
+        entered: [0; LANES],
+        to: [0.0; LANES],
+        begun: F64x8::ZERO,
+        active: Mask8::NONE,
+        refused: Mask8::NONE,
+        size: [0; 3],
+    };
+
     /// Tells whether rays can be walked so.
     pub(crate) fn can(layer: &Layer) -> bool {
         layer.size.iter().all(|&edge| edge <= LONGEST) && layer.masks.are_counted()
     }
 
-    /// Begins at stretches of rays, or later where they enter the grid; see [`Walk::begin`].
+    /// Begins in cells that are known to be those at the origins of rays, see [`Walk::begin_in`]; or at stretches of
+    /// rays, or later where they enter the grid, see [`Walk::begin`].
     #[inline(always)]
-    pub(crate) fn begin(rays: &GridRays, size: [i32; 3], stretch: &Stretch) -> Self {
-        let zero = F64x8::ZERO;
-        let late = stretch.from.above(zero);
-        let mut start = F64x8::pick(late, stretch.from, zero);
-        if let Some(cell) = rays.cells_within(size, start) {
-            return Self::at(rays, size, cell, I32x8::splat(3), start, stretch.to, rays.there);
+    pub(crate) fn begin(
+        rays: &GridRays,
+        size: [i32; 3],
+        known: Option<[I32x8; 3]>,
+        stretch: &Stretch,
+    ) -> Self {
+        let late = stretch.from.above(F64x8::ZERO);
+        let mut place = Place {
+            cell: [I32x8::splat(0); 3],
+            entered: I32x8::splat(3),
+            begun: F64x8::pick(late, stretch.from, F64x8::ZERO),
+            active: rays.there,
+        };
+        if let Some(cell) = known {
+            for (a, &edge) in size.iter().enumerate() {
+                place.active = place.active & !cell[a].is_negative() & cell[a].below(I32x8::splat(edge));
+                place.cell[a] = cell[a] ^ rays.flip[a];
+            }
+        } else if let Some(cell) = rays.cells_within(size, place.begun) {
+            place.cell = cell;
+        } else {
+            place.enter(rays, size, late);
         }
-        let mut axis = I32x8::pick(late, I32x8::splat(0), I32x8::splat(3));
-        let (mut entered, mut active) = (I32x8::splat(3), rays.there);
-        let low = |a: usize| rays.flip[a] & I32x8::splat(-size[a]);
-        for (a, &edge) in size.iter().enumerate() {
-            let this = I32x8::splat(a as i32);
-            let t = rays.plane(a, low(a));
-            let passed = start.above(t) | (t.equal(start) & this.below(axis));
-            let enters = !(passed | rays.still[a]);
-            start = F64x8::pick(enters, t, start);
-            axis = I32x8::pick(enters, this, axis);
-            entered = I32x8::pick(enters, this, entered);
-            let (place, last) = (rays.place[a], F64x8::splat(f64::from(edge)));
-            active = active & (!rays.still[a] | (place.at_least(zero) & last.at_least(place)));
-        }
-        active = active & F64x8::splat(f64::INFINITY).above(start);
-        let mut cell = [I32x8::splat(0); 3];
-        for a in 0..3 {
-            let this = I32x8::splat(a as i32);
-            let last = low(a) + I32x8::splat(size[a] - 1);
-            let t = rays.plane(a, last + I32x8::splat(1));
-            let left = start.above(t) | (t.equal(start) & this.below(axis));
-            active = active & (rays.still[a] | !left);
-            let moving = rays.cell_at(a, low(a), last, start, axis, active);
-            let moving = I32x8::pick(entered.equal(this), low(a), moving);
-            // The last cell holds both of its faces, so that a ray in the border of the grid is in it.
-            let still = rays.place[a].nearest_below().min(I32x8::splat(size[a] - 1));
-            cell[a] = I32x8::pick(rays.still[a], still, moving);
-        }
-        Self::at(rays, size, cell, entered, start, stretch.to, active)
-    }
-
-    /// Begins in known cells at the origins of rays; see [`Walk::begin_in`].
-    #[inline(always)]
-    pub(crate) fn begin_in(rays: &GridRays, size: [i32; 3], cell: [I32x8; 3], to: F64x8) -> Self {
-        let mut active = rays.there;
-        let mut mirrored = cell;
-        for a in 0..3 {
-            active = active & !cell[a].is_negative() & cell[a].below(I32x8::splat(size[a]));
-            mirrored[a] = cell[a] ^ rays.flip[a];
-        }
-        Self::at(rays, size, mirrored, I32x8::splat(3), F64x8::ZERO, to, active)
+        Self::at(rays, size, &place, stretch.to)
     }
 
     #[inline(always)]
     fn at(
         rays: &GridRays,
         size: [i32; 3],
-        cell: [I32x8; 3],
-        entered: I32x8,
-        begun: F64x8,
+        &Place { cell, entered, begun, mut active }: &Place,
         to: F64x8,
-        mut active: Mask8,
     ) -> Self {
         // Distances are counted in steps along the axis of the longest part: no number is then too large or small.
         let [x, y, z] = rays.direction;
@@ -171,23 +212,8 @@ impl Packet {
         let unit = F64x8::splat(1.0) / longest;
         let edge = f64::from(size[0].max(size[1]).max(size[2])) + 1.0;
         let mut far = F64x8::ZERO;
-        let mut packet = Self {
-            base: [[0; LANES]; 3],
-            origin: [[0.0; LANES]; 3],
-            direction: [[0.0; LANES]; 3],
-            inverse: [[0.0; LANES]; 3],
-            fuzz: [[0.0; LANES]; 3],
-            slack: [0.0; LANES],
-            flip: [rays.flip[0].0.values(), rays.flip[1].0.values(), rays.flip[2].0.values()],
-            end: [[0; LANES]; 3],
-            cell: [[0; LANES]; 3],
-            entered: entered.0.values(),
-            to: [0.0; LANES],
-            begun,
-            active,
-            refused: Mask8::NONE,
-            size,
-        };
+        let flip = rays.flip.map(|f| f.0.values());
+        let mut packet = Self { flip, entered: entered.0.values(), begun, size, ..Self::NOWHERE };
         for a in 0..3 {
             far = far.max(rays.origin[a].abs());
         }

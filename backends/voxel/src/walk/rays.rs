@@ -17,6 +17,17 @@ pub(crate) struct GridRays {
 }
 
 impl GridRays {
+    /// Rays of which none is there.
+    pub(crate) const NOWHERE: Self = Self {
+        place: [F64x8::ZERO; 3],
+        origin: [F64x8::ZERO; 3],
+        direction: [F64x8::ZERO; 3],
+        inverse: [F64x8::ZERO; 3],
+        flip: [I32x8::new([0; LANES]); 3],
+        still: [Mask8::ALL; 3],
+        there: Mask8::NONE,
+    };
+
     /// Makes rays ready; of those that go nowhere, or are not finite, none is there.
     #[inline(always)]
     pub(crate) fn new(origin: DVec3x8, direction: DVec3x8, there: Mask8) -> Self {

@@ -386,7 +386,7 @@ fn eight_rays_of_the_worst_kinds_meet_what_each_meets_alone() {
             // Every other time walks begin late, and end early.
             let (from, to) = if round % 2 == 0 { (-1.0, f64::INFINITY) } else { (random.next(), 1.0) };
             let stretch = Stretch { from: F64x8::splat(from), to: F64x8::splat(to) };
-            let mut packet = Packet::begin(&rays, grid.seen.size, &stretch);
+            let mut packet = Packet::begin(&rays, grid.seen.size, None, &stretch);
             let (other, other_rays) = last.get_or_insert((packet, rays));
             let begun = packet;
             let beside = (&*other, &*other_rays);
