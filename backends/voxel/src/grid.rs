@@ -88,7 +88,7 @@ impl Grid {
     /// Takes over chunks that became others.
     fn update(&mut self, changed: &[usize], chunks: &[Chunk]) {
         // Both layers hold the table: only who holds it alone may change it where it is.
-        self.blocking.masks = Arc::default();
+        self.blocking.masks = Arc::new(Masks::NONE);
         let masks = Arc::make_mut(&mut self.seen.masks);
         let [seen, blocking] = self.values;
         for &index in changed {

@@ -15,19 +15,22 @@ pub(crate) struct Masks {
 
 impl Default for Masks {
     fn default() -> Self {
-        let mut masks = Self {
-            top: Vec::new(),
-            middle: Vec::new(),
-            bottom: Vec::new(),
-            owners: Vec::new(),
-            free: Vec::new(),
-        };
+        let mut masks = Self::NONE;
         masks.add();
         masks
     }
 }
 
 impl Masks {
+    /// No slot at all, not even that of nothing: holds the place of masks while they are changed.
+    pub(crate) const NONE: Self = Self {
+        top: Vec::new(),
+        middle: Vec::new(),
+        bottom: Vec::new(),
+        owners: Vec::new(),
+        free: Vec::new(),
+    };
+
     /// The slot in which nothing is marked, and the only one: what became empty goes back there.
     pub(crate) const NOTHING: u32 = 0;
 

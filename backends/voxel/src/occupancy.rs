@@ -70,6 +70,12 @@ fn empty(word: u32, child: usize, exponent: u32) -> u32 {
     exponent + u32::from(word >> (child & 0b0_1010) & Occupancy::OCTET == 0)
 }
 
+/// Tells whether all bytes are one.
+fn are_alike(bytes: &[u8]) -> bool {
+    let first = bytes[0];
+    bytes.iter().fold(0, |other, &byte| other | (byte ^ first)) == 0
+}
+
 impl Occupancy {
     /// Bits of the 2^3 children around the first, in the order of [`child`].
     pub(crate) const OCTET: u32 = 0x0033_0033;
@@ -98,10 +104,20 @@ impl Occupancy {
                 marks.mark_rows(end, |_| u64::MAX);
             }
             Chunk::Cells(cells) => {
+                const ROW: usize = CHUNK as usize;
                 let wanted: [bool; 256] = std::array::from_fn(|v| wanted.has(v as u8));
+                let all = |bytes: &[u8]| {
+                    let is_wanted = if wanted[usize::from(bytes[0])] { u64::MAX } else { 0 };
+                    are_alike(bytes).then_some(is_wanted)
+                };
+                // Most slabs, and most rows, are air or stone alone: that is told many bytes at once.
+                let slabs: [Option<u64>; ROW] =
+                    std::array::from_fn(|z| all(&cells[z * ROW * ROW..(z + 1) * ROW * ROW]));
                 marks.mark_rows(end, |row| {
-                    let first = row * CHUNK as usize;
-                    let bytes = &cells[first..first + CHUNK as usize];
+                    let bytes = &cells[row * ROW..(row + 1) * ROW];
+                    if let Some(bits) = slabs[row / ROW].or_else(|| all(bytes)) {
+                        return bits;
+                    }
                     let bit = |(x, &v): (usize, &u8)| u64::from(wanted[usize::from(v)]) << x;
                     bytes.iter().enumerate().map(bit).fold(0, |row, bit| row | bit)
                 });
@@ -255,6 +271,28 @@ mod tests {
             }
         }
         assert!(sizes[..4].iter().all(|&n| n > 0), "{sizes:?}");
+    }
+
+    #[test]
+    fn slabs_and_rows_of_one_byte_are_marked_as_their_cells_are() {
+        // Slabs of one byte, slabs of rows of one byte each, and slabs in which a cell of a row is another one.
+        let byte = |x: u32, y: u32, z: u32| match z % 4 {
+            0 => (z / 4 % 4) as u8,
+            1 => (y % 4) as u8,
+            _ if [x, y] == [z, z] => 3,
+            _ => (y / 16) as u8,
+        };
+        let cells: Vec<u8> = (0..64 * 64 * 64u32).map(|i| byte(i % 64, i / 64 % 64, i / 4096)).collect();
+        let chunk = Chunk::Cells(cells.into());
+        for end in [[64; 3], [61, 64, 63], [1, 5, 64]] {
+            let marks = Occupancy::of(&chunk, end, &Values::of(|v| v == 3 || v == 1)).unwrap();
+            for i in 0..64 * 64 * 64u32 {
+                let cell = [i % 64, i / 64 % 64, i / 4096];
+                let is_wanted = byte(cell[0], cell[1], cell[2]) % 2 == 1;
+                let is_within = (0..3).all(|a| cell[a] < end[a]);
+                assert_eq!(marks.nodes().empty_around(cell).is_none(), is_wanted && is_within, "{cell:?}");
+            }
+        }
     }
 
     #[test]
