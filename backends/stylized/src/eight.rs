@@ -3,6 +3,7 @@
 use glam::Vec3;
 use polyptych_core::framebuffer::Framebuffer;
 use polyptych_core::lanes::{F32x8, LANES, Vec3x8};
+use std::hint::black_box;
 
 /// Eight pixels of a row, of which those beyond the picture's edge show nothing.
 #[derive(Clone, Copy)]
@@ -120,11 +121,22 @@ pub(crate) fn lacks<const N: usize>(ids: &[u32]) -> bool {
 /// Sorts eight vectors by their axes.
 #[inline(always)]
 pub(crate) fn sorted(from: &[Vec3; LANES]) -> Vec3x8 {
-    let mut all = Vec3x8::splat(Vec3::ZERO);
-    for (lane, v) in from.iter().enumerate() {
-        (all.x.0[lane], all.y.0[lane], all.z.0[lane]) = (v.x, v.y, v.z);
+    let mut flat = [[0.0f32; LANES]; 3];
+    for (i, v) in from.iter().enumerate() {
+        for (k, component) in v.to_array().into_iter().enumerate() {
+            flat[(3 * i + k) / LANES][(3 * i + k) % LANES] = component;
+        }
     }
-    all
+    // Three registers, whatever follows: the compiler would else read the numbers one by one.
+    let flat = flat.map(|row| black_box(F32x8::new(row)).0.values());
+    let mut axes = [[0.0f32; LANES]; 3];
+    for i in 0..LANES {
+        for (k, axis) in axes.iter_mut().enumerate() {
+            axis[i] = flat[(3 * i + k) / LANES][(3 * i + k) % LANES];
+        }
+    }
+    let [x, y, z] = axes.map(F32x8::new);
+    Vec3x8 { x, y, z }
 }
 
 /// Returns by how much numbers change to the row before or after, whichever is less.
