@@ -7,10 +7,12 @@
 //! vectors in it.
 
 mod held;
+mod vectors;
 
 pub use held::Held;
 use held::{Doubles, Singles, Words};
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
+pub use vectors::{DVec3x8, Vec3x8};
 
 /// Makes eight of something, lane by lane. A plain loop: closures may stay calls in builds that do not optimize
 /// across them.
@@ -46,24 +48,6 @@ pub struct I32x8(pub Held<Words, i32>);
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
 pub struct Mask8(pub Held<Words, u32>);
-
-/// Eight vectors, or colors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(missing_docs, reason = "the axes")]
-pub struct Vec3x8 {
-    pub x: F32x8,
-    pub y: F32x8,
-    pub z: F32x8,
-}
-
-/// Eight vectors in double precision.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(missing_docs, reason = "the axes")]
-pub struct DVec3x8 {
-    pub x: F64x8,
-    pub y: F64x8,
-    pub z: F64x8,
-}
 
 macro_rules! numbers {
     ($lanes:ident, $number:ty: $($trait:ident $method:ident $op:tt),*) => {
@@ -112,6 +96,13 @@ numbers!(I32x8, i32: Add add +, Sub sub -, Mul mul *, BitOr bitor |, BitAnd bita
 impl F32x8 {
     /// Zeros.
     pub const ZERO: Self = Self::new([0.0; LANES]);
+
+    /// Takes eight small whole numbers.
+    #[must_use]
+    #[inline(always)]
+    pub fn from_u16(values: [u16; LANES]) -> Self {
+        Self::new(lanes!(0.0, i => f32::from(values[i])))
+    }
 
     /// Widens to double precision.
     #[must_use]
@@ -191,8 +182,31 @@ impl F32x8 {
     #[must_use]
     #[inline(always)]
     pub fn nearest_below(self) -> I32x8 {
+        self.floor().nearest()
+    }
+
+    /// Returns the whole numbers below.
+    #[must_use]
+    #[inline(always)]
+    pub fn floor(self) -> Self {
         let a = self.0.values();
-        F32x8::new(lanes!(0.0, i => a[i].floor())).nearest()
+        Self::new(lanes!(0.0, i => a[i].floor()))
+    }
+
+    /// Returns the bits of each.
+    #[must_use]
+    #[inline(always)]
+    pub fn to_bits(self) -> I32x8 {
+        let a = self.0.values();
+        I32x8::new(lanes!(0, i => a[i].to_bits() as i32))
+    }
+
+    /// Returns the numbers of these bits.
+    #[must_use]
+    #[inline(always)]
+    pub fn from_bits(bits: I32x8) -> Self {
+        let bits = bits.0.values();
+        Self::new(lanes!(0.0, i => f32::from_bits(bits[i] as u32)))
     }
 
     /// Puts zero in place of what is not finite.
@@ -514,144 +528,6 @@ macro_rules! constructors {
 }
 constructors!(F32x8 f32, F64x8 f64, I32x8 i32, Mask8 u32);
 
-macro_rules! vectors {
-    ($vectors:ident, $lanes:ident, $one:ty) => {
-        impl $vectors {
-            /// Repeats a vector.
-            #[must_use]
-            #[inline(always)]
-            pub fn splat(v: $one) -> Self {
-                Self { x: $lanes::splat(v.x), y: $lanes::splat(v.y), z: $lanes::splat(v.z) }
-            }
-
-            /// Returns one of them.
-            #[must_use]
-            #[inline(always)]
-            pub fn get(&self, lane: usize) -> $one {
-                <$one>::new(self.x.0[lane], self.y.0[lane], self.z.0[lane])
-            }
-
-            /// Sets one of them.
-            #[inline(always)]
-            pub fn set(&mut self, lane: usize, v: $one) {
-                (self.x.0[lane], self.y.0[lane], self.z.0[lane]) = (v.x, v.y, v.z);
-            }
-
-            /// Returns the inner products.
-            #[must_use]
-            #[inline(always)]
-            pub fn dot(self, other: Self) -> $lanes {
-                self.x * other.x + self.y * other.y + self.z * other.z
-            }
-
-            /// Returns the lengths.
-            #[must_use]
-            #[inline(always)]
-            pub fn length(self) -> $lanes {
-                self.dot(self).sqrt()
-            }
-
-            /// Multiplies each by its number.
-            #[must_use]
-            #[inline(always)]
-            pub fn scaled(self, by: $lanes) -> Self {
-                Self { x: self.x * by, y: self.y * by, z: self.z * by }
-            }
-        }
-
-        impl Add for $vectors {
-            type Output = Self;
-            #[inline(always)]
-            fn add(self, other: Self) -> Self {
-                Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
-            }
-        }
-
-        impl Sub for $vectors {
-            type Output = Self;
-            #[inline(always)]
-            fn sub(self, other: Self) -> Self {
-                Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
-            }
-        }
-
-        impl Mul for $vectors {
-            type Output = Self;
-            #[inline(always)]
-            fn mul(self, other: Self) -> Self {
-                Self { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
-            }
-        }
-    };
-}
-vectors!(Vec3x8, F32x8, glam::Vec3);
-vectors!(DVec3x8, F64x8, glam::DVec3);
-
-impl Vec3x8 {
-    /// Takes `yes` where the mask is set, else `no`.
-    #[must_use]
-    #[inline(always)]
-    pub fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
-        Self { x: mask.pick(yes.x, no.x), y: mask.pick(yes.y, no.y), z: mask.pick(yes.z, no.z) }
-    }
-
-    /// Puts zero in place of components that are not finite.
-    #[must_use]
-    #[inline(always)]
-    pub fn finite(self) -> Self {
-        Self { x: self.x.finite(), y: self.y.finite(), z: self.z.finite() }
-    }
-}
-
-impl Vec3x8 {
-    /// Widens to double precision.
-    #[must_use]
-    #[inline(always)]
-    pub fn to_f64(self) -> DVec3x8 {
-        DVec3x8 { x: self.x.to_f64(), y: self.y.to_f64(), z: self.z.to_f64() }
-    }
-}
-
-impl DVec3x8 {
-    /// Takes `yes` where the mask is set, else `no`.
-    #[must_use]
-    #[inline(always)]
-    pub fn pick(mask: Mask8, yes: Self, no: Self) -> Self {
-        Self {
-            x: F64x8::pick(mask, yes.x, no.x),
-            y: F64x8::pick(mask, yes.y, no.y),
-            z: F64x8::pick(mask, yes.z, no.z),
-        }
-    }
-
-    /// Returns the cross products.
-    #[must_use]
-    #[inline(always)]
-    pub fn cross(self, other: Self) -> Self {
-        Self {
-            x: self.y * other.z - self.z * other.y,
-            y: self.z * other.x - self.x * other.z,
-            z: self.x * other.y - self.y * other.x,
-        }
-    }
-
-    /// Multiplies each as a vector by a matrix.
-    #[must_use]
-    #[inline(always)]
-    pub fn turned(self, by: &glam::DMat3) -> Self {
-        Self::splat(by.x_axis).scaled(self.x)
-            + Self::splat(by.y_axis).scaled(self.y)
-            + Self::splat(by.z_axis).scaled(self.z)
-    }
-
-    /// Rounds to single precision.
-    #[must_use]
-    #[inline(always)]
-    pub fn round(self) -> Vec3x8 {
-        Vec3x8 { x: self.x.round(), y: self.y.round(), z: self.z.round() }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -679,6 +555,8 @@ mod tests {
         assert_eq!(halves.nearest().0, [0, 0, 2, 2, -3, 1_000_000_000, -1_000_000_000, 0]);
         let single = F32x8::new([0.5, -0.5, 1.5, 2.4, -2.6, 4e6, -4e6, 0.0]);
         assert_eq!(single.nearest().0, [0, 0, 2, 2, -3, 4_000_000, -4_000_000, 0]);
+        assert_eq!(single.floor().0, [0.0, -1.0, 1.0, 2.0, -3.0, 4e6, -4e6, 0.0]);
+        assert_eq!(F32x8::from_bits(single.to_bits()), single);
         assert_eq!(single.nearest_below().0, [0, -1, 1, 2, -3, 4_000_000, -4_000_000, 0]);
         let (low, high) = (I32x8::splat(-3), I32x8::count_from(-5));
         assert_eq!(high.max(low).min(I32x8::splat(0)).0, [-3, -3, -3, -2, -1, 0, 0, 0]);

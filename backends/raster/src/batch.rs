@@ -3,7 +3,7 @@
 //! Eight pixels in a row that show one triangle, as most do where triangles are large, meet a [`Face`] that was set up
 //! for all of them. Others meet a triangle each.
 
-use crate::color::{Changes, ChangesAll, Spot};
+use crate::color::{ChangesAll, Spots};
 use crate::face::Face;
 use crate::info::Shading;
 use crate::lens::Lens;
@@ -181,14 +181,12 @@ impl<'a> Batch<'a> {
         let has_one_color = model.parts[face.part as usize].has_one_color(material);
         let turns = turns && material.normal_map.is_some();
         let paints = ask == Ask::Color && !has_one_color;
-        let changes = (turns || paints).then(|| face.changes(lens, self.x, self.y, &met));
-        if paints {
-            self.paint((scene, model), &met.weights, changes.as_ref());
-        } else if ask == Ask::Color {
+        if ask == Ask::Color && !paints {
             self.fill_color(material);
         }
-        if turns {
-            self.turn((scene, model), &met.weights, changes.as_ref());
+        if turns || paints {
+            let changes = face.changes(lens, self.x, self.y, &met);
+            self.paint_and_turn((scene, model), &met.weights, &changes, [paints, turns]);
         }
         self.reach(lens);
         true
@@ -201,9 +199,9 @@ impl<'a> Batch<'a> {
         let octet = Octet::of(model, lens.origin, &self.names, self.count, shading != Shading::Flat);
         self.find_materials(scene, model);
         let materials = || self.material[..self.count].iter().flatten();
-        let paints = ask == Ask::Color && materials().any(|material| material.texture.is_some());
+        let has_textures = ask == Ask::Color && materials().any(|material| material.texture.is_some());
         let turns = turns && materials().any(|material| material.normal_map.is_some());
-        let met = octet.meet(lens, self.x, self.y, paints || turns);
+        let met = octet.meet(lens, self.x, self.y, has_textures || turns);
         self.t = met.t;
         self.weights = [met.weights[0].round(), met.weights[1].round()];
         (self.true_normal, self.normal) = (met.true_normal, met.normal);
@@ -229,14 +227,14 @@ impl<'a> Batch<'a> {
             self.normal.set(i, normal);
             self.true_normal.set(i, outward);
         }
-        if ask == Ask::Color {
-            match self.material[0].filter(|material| self.is_of_one_color(model, material)) {
-                Some(material) => self.fill_color(material),
-                None => self.paint((scene, model), &weights, changes.as_ref()),
-            }
+        let one_color = self.material[0].filter(|material| self.is_of_one_color(model, material));
+        if let (Ask::Color, Some(material)) = (ask, one_color) {
+            self.fill_color(material);
         }
-        if turns {
-            self.turn((scene, model), &weights, changes.as_ref());
+        let paints = ask == Ask::Color && one_color.is_none();
+        if paints || turns {
+            let changes = changes.unwrap_or(ChangesAll::NONE);
+            self.paint_and_turn((scene, model), &weights, &changes, [paints, turns]);
         }
         self.reach(lens);
         for i in (0..self.count).filter(|_| any_held) {
@@ -260,49 +258,25 @@ impl<'a> Batch<'a> {
         self.color = Vec3x8::splat(material.base_color);
     }
 
-    /// Finds the color of each place.
+    /// Finds the color of each place, and turns the normal of each that has a normal map, if so asked.
     #[inline(always)]
-    fn paint(
+    fn paint_and_turn(
         &mut self,
         (scene, model): (&Scene, &Model),
         weights: &[F64x8; 2],
-        changes: Option<&ChangesAll>,
+        changes: &ChangesAll,
+        [paints, turns]: [bool; 2],
     ) {
-        for i in 0..self.count {
-            let Some(material) = self.material[i] else { continue };
-            let (color, opacity) = self.spot((scene, model), weights, changes, i).color(material);
-            self.opacity[i] = opacity;
-            self.color.set(i, color);
+        let Self { count, names, material: materials, .. } = &*self;
+        let (count, names, materials, is_one) = (*count, *names, *materials, self.is_one);
+        let (names, materials) = (&names, &materials);
+        let spots = Spots { scene, model, count, is_one, names, materials, weights, changes };
+        if paints {
+            (self.color, self.opacity) = spots.color();
         }
-    }
-
-    /// Turns the normal of each place that has a normal map.
-    #[inline(always)]
-    fn turn(&mut self, of: (&Scene, &Model), weights: &[F64x8; 2], changes: Option<&ChangesAll>) {
-        self.straighten();
-        for i in 0..self.count {
-            if let Some(map) = self.material[i].and_then(|material| material.normal_map.as_ref()) {
-                let spot = self.spot(of, weights, changes, i);
-                let normals = (self.normal.get(i), self.true_normal.get(i).as_vec3());
-                self.normal.set(i, spot.turned(map, normals.0, normals.1));
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn spot<'s>(
-        &self,
-        (scene, model): (&'s Scene, &'s Model),
-        weights: &[F64x8; 2],
-        changes: Option<&ChangesAll>,
-        i: usize,
-    ) -> Spot<'s> {
-        Spot {
-            scene,
-            part: &model.parts[self.names.part[i] as usize],
-            triangle: self.names.triangle[i] as usize,
-            weights: [weights[0].0[i], weights[1].0[i]],
-            changes: changes.map_or(Changes::NONE, |changes| changes.of(i)),
+        if turns {
+            self.straighten();
+            spots.turn(&mut self.normal, &self.true_normal);
         }
     }
 

@@ -4,10 +4,11 @@
 //! change of the weights over one pixel to the right and one down.
 
 use crate::lens::{Lens, OnRays, Rays};
-use crate::model::Part;
-use glam::{Vec2, Vec3, Vec4};
-use polyptych_core::lanes::{F32x8, F64x8};
-use polyptych_core::scene::{Mapping, Material, NormalMap, Scene, Texture, TextureWrap};
+use crate::model::{Model, Part};
+use crate::octet::Names;
+use glam::{DVec3, Vec2, Vec3, Vec4};
+use polyptych_core::lanes::{DVec3x8, F32x8, F64x8, LANES, Mask8, Vec3x8};
+use polyptych_core::scene::{AlphaMode, Mapping, Material, NormalMap, Scene, Texture};
 
 /// How the weights of the second and third corner change over one pixel to the right, and over one down.
 #[derive(Clone, Copy)]
@@ -24,8 +25,15 @@ pub(crate) struct ChangesAll {
 }
 
 impl ChangesAll {
+    /// Where nothing asks for them.
+    pub(crate) const NONE: Self = Self { right: [F32x8::ZERO; 2], down: [F32x8::ZERO; 2] };
+
+    pub(crate) fn splat(changes: Changes) -> Self {
+        Self { right: changes.right.map(F32x8::splat), down: changes.down.map(F32x8::splat) }
+    }
+
     #[inline(always)]
-    pub(crate) fn of(&self, lane: usize) -> Changes {
+    fn of(&self, lane: usize) -> Changes {
         let of = |all: &[F32x8; 2]| [all[0].0[lane], all[1].0[lane]];
         Changes { right: of(&self.right), down: of(&self.down) }
     }
@@ -38,154 +46,183 @@ impl ChangesAll {
     }
 }
 
-impl Changes {
-    /// Of what is met nowhere else.
-    pub(crate) const NONE: Self = Self { right: [0.0; 2], down: [0.0; 2] };
-}
-
-/// A place on a triangle of a part.
+/// Places on eight triangles, those that there are first.
 #[derive(Clone, Copy)]
-pub(crate) struct Spot<'a> {
+pub(crate) struct Spots<'a> {
     pub(crate) scene: &'a Scene,
-    pub(crate) part: &'a Part,
-    pub(crate) triangle: usize,
+    pub(crate) model: &'a Model,
+    pub(crate) count: usize,
+    /// Whether there are eight, all on one triangle.
+    pub(crate) is_one: bool,
+    pub(crate) names: &'a Names,
+    pub(crate) materials: &'a [Option<&'a Material>; LANES],
     /// Of the second and third corner.
-    pub(crate) weights: [f64; 2],
-    pub(crate) changes: Changes,
+    pub(crate) weights: &'a [F64x8; 2],
+    pub(crate) changes: &'a ChangesAll,
 }
 
-impl Spot<'_> {
-    /// Returns base color and effective opacity.
+/// Places of one part that have one material.
+struct Alike<'a> {
+    part: &'a Part,
+    material: &'a Material,
+    lanes: Mask8,
+}
+
+impl<'a> Spots<'a> {
+    /// Returns base colors and effective opacities.
     #[inline(always)]
-    pub(crate) fn color(&self, material: &Material) -> (Vec3, f32) {
-        let texture = material.texture.and_then(|t| self.scene.textures.get(t));
-        let (base, opacity) = match texture {
-            None => (material.base_color, material.opacity),
-            Some(texture) => {
-                let has_uvs = !self.part.mesh().uvs.is_empty();
-                let texel = match material.mapping {
-                    Mapping::Uv if has_uvs => self.texel(texture),
-                    Mapping::Uv => self.triplanar(texture, 1.0),
-                    Mapping::Triplanar { scale } => self.triplanar(texture, scale),
-                };
-                (material.base_color * texel.truncate(), material.opacity * texel.w)
+    pub(crate) fn color(&self) -> (Vec3x8, [f32; LANES]) {
+        let (mut color, mut opacity) = (Vec3x8::splat(Vec3::ZERO), F32x8::splat(1.0));
+        let mut waits = Mask8::first(self.count);
+        while let Some(alike) = self.next(&mut waits) {
+            let (of_all, opacities) = self.color_of(&alike);
+            color = Vec3x8::pick(alike.lanes, of_all, color);
+            opacity = alike.lanes.pick(opacities.min(F32x8::splat(1.0)), opacity);
+            if !alike.part.mesh().colors.is_empty() {
+                self.tint(&alike, &mut color);
             }
-        };
-        let [v, w] = self.weights;
-        let tinted = self.part.tinted(base, self.triangle, [v as f32, w as f32]);
-        (tinted, material.effective_opacity(opacity).min(1.0))
+        }
+        (color, opacity.0.values())
     }
 
-    /// Returns a unit shading normal as a normal map turns it. Both normals are on the viewer's side.
+    /// Turns unit shading normals as normal maps say. Both normals are on the viewer's side.
     #[inline(always)]
-    pub(crate) fn turned(&self, map: &NormalMap, normal: Vec3, true_normal: Vec3) -> Vec3 {
-        let (part, mesh) = (self.part, self.part.mesh());
-        let Some(texture) = self.scene.textures.get(map.texture) else { return normal };
-        let Some(along) = mesh.along_uv(self.triangle) else { return normal };
+    pub(crate) fn turn(&self, normals: &mut Vec3x8, true_normals: &DVec3x8) {
+        let mut waits = Mask8::first(self.count);
+        while let Some(alike) = self.next(&mut waits) {
+            let Some(map) = &alike.material.normal_map else { continue };
+            let Some(texture) = self.scene.textures.get(map.texture) else { continue };
+            let texels = self.texels(alike.part.mesh(), texture, alike.lanes);
+            for lane in 0..LANES {
+                if alike.lanes.has(lane) {
+                    let texel = Vec3::new(texels[0].0[lane], texels[1].0[lane], texels[2].0[lane]);
+                    let of = (normals.get(lane), true_normals.get(lane).as_vec3());
+                    normals.set(lane, self.turned(&alike, map, lane, texel, of));
+                }
+            }
+        }
+    }
+
+    /// Takes the first of those that wait, and all like it.
+    #[inline(always)]
+    fn next(&self, waits: &mut Mask8) -> Option<Alike<'a>> {
+        if let (true, Some(material)) = (self.is_one & waits.any(), self.materials[0]) {
+            *waits = Mask8::NONE;
+            let part = &self.model.parts[self.names.part[0] as usize];
+            return Some(Alike { part, material, lanes: Mask8::ALL });
+        }
+        let mut lead = 0;
+        while lead < self.count {
+            if let Some(material) = self.materials[lead].filter(|_| waits.has(lead)) {
+                let mut lanes = Mask8::NONE;
+                for lane in lead..self.count {
+                    let same = self.materials[lane].is_some_and(|other| std::ptr::eq(other, material));
+                    if same & (self.names.part[lane] == self.names.part[lead]) {
+                        lanes.0[lane] = u32::MAX;
+                    }
+                }
+                *waits = *waits & !lanes;
+                let part = &self.model.parts[self.names.part[lead] as usize];
+                return Some(Alike { part, material, lanes });
+            }
+            lead += 1;
+        }
+        None
+    }
+
+    /// Returns colors and effective opacities as material and texture give them.
+    #[inline(always)]
+    fn color_of(&self, alike: &Alike<'_>) -> (Vec3x8, F32x8) {
+        let Alike { part, material, lanes } = alike;
+        let base = Vec3x8::splat(material.base_color);
+        let Some(texture) = material.texture.and_then(|t| self.scene.textures.get(t)) else {
+            return (base, F32x8::splat(material.effective_opacity(material.opacity)));
+        };
+        let mesh = part.mesh();
+        let [r, g, b, a] = match material.mapping {
+            Mapping::Uv if !mesh.uvs.is_empty() => self.texels(mesh, texture, *lanes),
+            Mapping::Uv => self.triplanar(part, texture, 1.0, *lanes),
+            Mapping::Triplanar { scale } => self.triplanar(part, texture, scale, *lanes),
+        };
+        let mut opacity = F32x8::splat(material.opacity);
+        if material.alpha != AlphaMode::Opaque {
+            for (lane, opacity) in opacity.0.iter_mut().enumerate() {
+                *opacity = material.effective_opacity(*opacity * a.0[lane]);
+            }
+        }
+        (base * Vec3x8 { x: r, y: g, z: b }, opacity)
+    }
+
+    /// Multiplies by the colors of corners.
+    #[inline(never)]
+    fn tint(&self, alike: &Alike<'_>, color: &mut Vec3x8) {
+        for lane in (0..LANES).filter(|&lane| alike.lanes.has(lane)) {
+            let weights = [self.weights[0].0[lane] as f32, self.weights[1].0[lane] as f32];
+            let triangle = self.names.triangle[lane] as usize;
+            color.set(lane, alike.part.tinted(color.get(lane), triangle, weights));
+        }
+    }
+
+    #[inline(always)]
+    fn turned(
+        &self,
+        alike: &Alike<'_>,
+        map: &NormalMap,
+        lane: usize,
+        texel: Vec3,
+        (normal, true_normal): (Vec3, Vec3),
+    ) -> Vec3 {
+        let (part, mesh, triangle) = (alike.part, alike.part.mesh(), self.names.triangle[lane] as usize);
+        let Some(along) = mesh.along_uv(triangle) else { return normal };
         let along = along.map(|v| (part.world_from_object.matrix3 * v.as_dvec3()).as_vec3());
-        let [a, b, c] = mesh.corners(self.triangle);
+        let [a, b, c] = mesh.corners(triangle);
         let outside = part.world_from_normal * (b - a).cross(c - a);
         let side = if outside.dot(true_normal) < 0.0 { -1.0 } else { 1.0 };
-        map.turned(normal * side, along, self.texel(texture).truncate()) * side
-    }
-
-    /// Returns the mean of a texture over the pixel.
-    #[inline(always)]
-    fn texel(&self, texture: &Texture) -> Vec4 {
-        let mesh = self.part.mesh();
-        let [a, b, c] = mesh.triangles[self.triangle];
-        let (a, b, c) = (mesh.uvs[a as usize], mesh.uvs[b as usize], mesh.uvs[c as usize]);
-        let [v, w] = self.weights;
-        let uv = a.as_dvec2() * (1.0 - v - w) + b.as_dvec2() * v + c.as_dvec2() * w;
-        let moved = |[v, w]: [f32; 2]| (b - a) * v + (c - a) * w;
-        let (uv, [width, height]) = (uv.as_vec2(), texture.size());
-        let size = Vec2::new(width as f32, height as f32);
-        // Beyond a border that is drawn out nothing changes: a halved picture would show what is within it.
-        let extent = |k: usize| {
-            let is_border = texture.wrap[k] == TextureWrap::Clamp && !(0.0..=1.0).contains(&uv[k]);
-            if is_border { 0.0 } else { size[k] }
-        };
-        let extent = Vec2::new(extent(0), extent(1));
-        let print = Footprint::of(moved(self.changes.right) * extent, moved(self.changes.down) * extent);
-        let lod = Texture::level_of(print.width_squared, logarithm);
-        if print.count == 1 {
-            return texture.sample_here(uv.to_array(), lod);
-        }
-        let share = 1.0 / print.count as f32;
-        let (step, mut sum) = (print.axis / size * share, Vec4::ZERO);
-        let first = uv - step * (0.5 * (print.count - 1) as f32);
-        for k in 0..print.count {
-            sum += texture.sample_here((first + step * k as f32).to_array(), lod);
-        }
-        sum * share
+        map.turned(normal * side, along, texel) * side
     }
 
     #[inline(never)]
-    fn triplanar(&self, texture: &Texture, scale: f32) -> Vec4 {
-        let mesh = self.part.mesh();
-        let [a, b, c] = mesh.triangles[self.triangle].map(|i| mesh.positions[i as usize].as_dvec3());
-        let [v, w] = self.weights;
-        let position = (a * (1.0 - v - w) + b * v + c * w).as_vec3() * scale;
-        let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-        let (ab, ac) = ((b - a).as_vec3() * scale, (c - a).as_vec3() * scale);
-        let moved = |[v, w]: [f32; 2]| Vec2::new((ab * v + ac * w).length(), 0.0);
-        texture.triplanar(position, normal, texture.lod(moved(self.changes.right), moved(self.changes.down)))
-    }
-}
-
-/// Most lookups side by side in a pixel.
-const MOST: f32 = 16.0;
-
-/// What a pixel covers of a texture: as many squares in a row.
-///
-/// The pixel's square becomes a parallelogram, whose variances are those of a rectangle of its singular values: as many
-/// lookups of the shorter width fill the longer one (after J. McCormack et al., *Feline: fast elliptical lines for
-/// anisotropic texture mapping*, SIGGRAPH 1999, section 3).
-struct Footprint {
-    count: u32,
-    /// The longer side, texels.
-    axis: Vec2,
-    /// Of one lookup, texels.
-    width_squared: f32,
-}
-
-impl Footprint {
-    /// Takes what one pixel to the right and one down move by, in texels.
-    #[inline(always)]
-    fn of(right: Vec2, down: Vec2) -> Self {
-        let sum = right * right + down * down;
-        let (mixed, area) = (right.x * right.y + down.x * down.y, right.perp_dot(down));
-        let half = 0.5 * (sum.x - sum.y);
-        let longer = 0.5 * (sum.x + sum.y) + (half * half + mixed * mixed).sqrt();
-        // A lookup is no narrower than what a texel of the full picture spreads to.
-        let shorter = (area * area / longer).max(3.0);
-        let ratio = (longer / shorter).sqrt();
-        if !(ratio >= 1.5 && longer.is_finite()) {
-            return Self { count: 1, axis: Vec2::ZERO, width_squared: longer };
+    fn triplanar(&self, part: &Part, texture: &Texture, scale: f32, lanes: Mask8) -> [F32x8; 4] {
+        let mut texels = [Vec4::ZERO; LANES];
+        for lane in (0..LANES).filter(|&lane| lanes.has(lane)) {
+            let mesh = part.mesh();
+            let corners = mesh.triangles[self.names.triangle[lane] as usize];
+            let [a, b, c]: [DVec3; 3] = corners.map(|i| mesh.positions[i as usize].as_dvec3());
+            let [v, w] = [self.weights[0].0[lane], self.weights[1].0[lane]];
+            let position = (a * (1.0 - v - w) + b * v + c * w).as_vec3() * scale;
+            let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
+            let (ab, ac) = ((b - a).as_vec3() * scale, (c - a).as_vec3() * scale);
+            let moved = |[v, w]: [f32; 2]| Vec2::new((ab * v + ac * w).length(), 0.0);
+            let changes = self.changes.of(lane);
+            let lod = texture.lod(moved(changes.right), moved(changes.down));
+            texels[lane] = texture.triplanar(position, normal, lod);
         }
-        let count = (ratio + 0.5).min(MOST) as u32;
-        let width_squared = shorter.max(longer / (count * count) as f32);
-        // Of the two forms of the direction, that without cancellation.
-        let along =
-            if half > 0.0 { Vec2::new(longer - sum.y, mixed) } else { Vec2::new(mixed, longer - sum.x) };
-        let length = along.length();
-        let axis =
-            if length > 0.0 { along * (longer.sqrt() / length) } else { Vec2::new(longer.sqrt(), 0.0) };
-        Self { count, axis, width_squared }
+        by_channel(&texels)
     }
 }
 
-/// Returns the logarithm to base 2 of a number above 1, to 2e-5: with `t = (m - 1) / (m + 1)` of the mantissa `m`,
-/// `2 artanh(t) / ln 2` by its series.
+/// Turns eight texels into their channels.
 #[inline(always)]
-fn logarithm(v: f32) -> f32 {
-    let bits = v.to_bits();
-    let exponent = (bits >> 23) as i32 - 127;
-    let mantissa = f32::from_bits(bits & 0x7F_FFFF | 0x3F80_0000);
-    let t = (mantissa - 1.0) / (mantissa + 1.0);
-    let squared = t * t;
-    let series = 1.0 + squared * (1.0 / 3.0 + squared * (1.0 / 5.0 + squared * (1.0 / 7.0 + squared / 9.0)));
-    exponent as f32 + t * series * (2.0 * std::f32::consts::LOG2_E)
+pub(crate) fn by_channel(texels: &[Vec4; LANES]) -> [F32x8; 4] {
+    let mut channels = [F32x8::ZERO; 4];
+    for (lane, texel) in texels.iter().enumerate() {
+        let [r, g, b, a] = texel.to_array();
+        (channels[0].0[lane], channels[1].0[lane]) = (r, g);
+        (channels[2].0[lane], channels[3].0[lane]) = (b, a);
+    }
+    channels
+}
+
+polyptych_core::for_registers! {
+    /// Returns base color and effective opacity of the first of spots.
+    pub(crate) fn color_of_first(spots: &Spots<'_>) -> (Vec3, f32)
+        = color_of_first_512, color_of_first_256, color_of_first_here;
+}
+
+#[inline(always)]
+fn color_of_first_here(spots: &Spots<'_>) -> (Vec3, f32) {
+    let (color, opacity) = spots.color();
+    (color.get(0), opacity[0])
 }
 
 /// Finds how weights change whose functions along the rays are given, as is the plane's and how far along the rays it
@@ -233,62 +270,5 @@ pub(crate) fn changes_all(
     ChangesAll {
         right: [((v_steps[0] - v * right) * factor).round(), ((w_steps[0] - w * right) * factor).round()],
         down: [((v_steps[1] - v * down) * factor).round(), ((w_steps[1] - w * down) * factor).round()],
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lookups_cover_what_a_pixel_covers() {
-        for (longer, shorter) in
-            [(0.5, 0.2), (3.0, 3.0), (4.0, 3.5), (12.0, 3.0), (9.0, 0.1), (90.0, 2.0), (9.0, 0.0)]
-        {
-            for (turn, spin) in (0..12).flat_map(|i| (0..7).map(move |k| (i as f32 * 0.5, k as f32 * 0.9))) {
-                let (first, second) =
-                    (Vec2::from_angle(turn) * longer, Vec2::from_angle(turn).perp() * shorter);
-                let along = Vec2::from_angle(spin);
-                let print =
-                    Footprint::of(first * along.x + second * along.y, second * along.x - first * along.y);
-                let width = print.width_squared.sqrt();
-                let wide = shorter.max(3f32.sqrt());
-                if print.count == 1 {
-                    assert!(
-                        (width - longer).abs() < 1e-3 && longer < 1.5 * wide + 1e-3,
-                        "{longer} {shorter}: {width}"
-                    );
-                    continue;
-                }
-                let count = print.count as f32;
-                assert!(
-                    (print.axis.length() - longer).abs() < 1e-3 * longer,
-                    "{longer} {shorter} {turn} {spin}"
-                );
-                assert!(
-                    print.axis.perp_dot(first).abs() < 2e-3 * longer * longer,
-                    "{turn} {spin}: {}",
-                    print.axis
-                );
-                assert!(
-                    width * count >= longer * 0.999 && width >= wide * 0.999,
-                    "{longer} {shorter}: {width}"
-                );
-                assert!(count == MOST || width < 1.51 * wide, "{longer} {shorter}: {width} x {count}");
-            }
-        }
-        for strange in [f32::NAN, f32::INFINITY, 1e30, 0.0] {
-            assert_eq!(Footprint::of(Vec2::splat(strange), Vec2::X).count.max(16), 16, "{strange}");
-        }
-    }
-
-    #[test]
-    fn logarithms_are_right_to_two_hundred_thousandths() {
-        for i in 0..10_000 {
-            let v = 1.0001_f32 * 1.003_f32.powi(i % 9000);
-            if v.is_finite() {
-                assert!((logarithm(v) - v.log2()).abs() < 2e-5 + 1e-6 * v.log2(), "{v}");
-            }
-        }
     }
 }

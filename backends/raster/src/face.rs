@@ -5,12 +5,13 @@
 //! Along the rays of a picture every linear function of a point is affine in column and row; a triangle is set
 //! up once for all pixels of a tile that show it.
 
-use crate::color::{Changes, ChangesAll, Spot, changes, changes_all};
+use crate::color::{Changes, ChangesAll, Spots, changes, changes_all, color_of_first};
 use crate::lens::{Lens, OnRays};
 use crate::model::{Model, Part};
+use crate::octet::Names;
 use crate::tile::NO_TRIANGLE;
 use glam::{DVec3, Vec3};
-use polyptych_core::lanes::{F64x8, Vec3x8};
+use polyptych_core::lanes::{F64x8, LANES, Vec3x8};
 use polyptych_core::scene::{Material, Mesh, Scene};
 
 /// Weights of corners that a snapped corner may cause outside of the triangle are extrapolated up to here;
@@ -180,14 +181,16 @@ impl Face {
 
     /// Returns base color and effective opacity where a ray met it.
     pub(crate) fn color(&self, at: &Place<'_>, met: &Met) -> (Vec3, f32) {
-        let spot = Spot {
+        color_of_first(&Spots {
             scene: at.scene,
-            part: &at.model.parts[self.part as usize],
-            triangle: self.triangle as usize,
-            weights: [met.weights[1], met.weights[2]],
-            changes: self.changes_at(at.lens, at.x, at.y, met.t),
-        };
-        spot.color(self.material(at.scene, at.model))
+            model: at.model,
+            count: 1,
+            is_one: false,
+            names: &Names { id: [0; LANES], part: [self.part; LANES], triangle: [self.triangle; LANES] },
+            materials: &[Some(self.material(at.scene, at.model)); LANES],
+            weights: &[F64x8::splat(met.weights[1]), F64x8::splat(met.weights[2])],
+            changes: &ChangesAll::splat(self.changes_at(at.lens, at.x, at.y, met.t)),
+        })
     }
 
     /// Returns how the weights change over a pixel where a ray met it.

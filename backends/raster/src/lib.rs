@@ -81,6 +81,7 @@ mod strokes;
 mod surfaces;
 #[cfg(test)]
 mod tests;
+mod texels;
 mod tile;
 mod transform;
 

@@ -9,7 +9,7 @@ use crate::paint::{OPAQUE, Painter};
 use crate::tile::NO_TRIANGLE;
 use glam::Vec3;
 use polyptych_core::framebuffer::{Band, Pixel};
-use polyptych_core::lanes::LANES;
+use polyptych_core::lanes::{F32x8, LANES, Vec3x8};
 
 /// Flags of a sample's tag, above the pixel's index in the tile.
 pub(crate) const LAYER: u32 = 1 << 16;
@@ -137,21 +137,37 @@ impl<'a> TilePainter<'_, 'a, '_> {
     }
 
     /// Writes samples of solid surfaces, plane by plane.
+    #[inline(always)]
     fn write(&mut self, batch: &Batch<'_>, index: &[usize]) {
-        fn fill<T>(plane: &mut [T], index: &[usize], value: impl Fn(usize) -> T) {
-            if !plane.is_empty() {
-                index.iter().enumerate().for_each(|(i, &at)| plane[at] = value(i));
+        #[inline(always)]
+        fn fill<T: Copy>(plane: &mut [T], index: &[usize], values: &[T; LANES]) {
+            if plane.is_empty() {
+                return;
+            }
+            // Mostly eight pixels in a row: places only grow.
+            if let &[first, _, _, _, _, _, _, last] = index
+                && last - first == LANES - 1
+            {
+                plane[first..first + LANES].copy_from_slice(values);
+                return;
+            }
+            for (&at, value) in index.iter().zip(values) {
+                plane[at] = *value;
             }
         }
         let parts = &self.painter.light.model.parts;
-        let object = |i: usize| parts[batch.names.part[i] as usize].object;
-        fill(self.band.color, index, |i| finite(batch.lit.get(i)));
-        fill(self.band.distance, index, |i| batch.distance.0[i] as f32);
-        fill(self.band.normal, index, |i| finite(batch.normal.get(i)));
-        fill(self.band.id, index, |i| object(i) as u32 + 1);
-        fill(self.band.albedo, index, |i| finite(batch.color.get(i)));
-        fill(self.band.shadow, index, |i| batch.shadow.0[i]);
-        fill(self.band.coverage, index, |_| 1.0);
+        let mut ids = [0; LANES];
+        for (id, part) in ids.iter_mut().zip(&batch.names.part[..batch.count]) {
+            *id = parts[*part as usize].object as u32 + 1;
+        }
+        let band = &mut *self.band;
+        fill(band.color, index, &in_a_row(batch.lit));
+        fill(band.distance, index, &batch.distance.round().0.values());
+        fill(band.normal, index, &in_a_row(batch.normal));
+        fill(band.id, index, &ids);
+        fill(band.albedo, index, &in_a_row(batch.color));
+        fill(band.shadow, index, &batch.shadow.0.values());
+        fill(band.coverage, index, &[1.0; LANES]);
         self.shaded += index.len() as u64;
     }
 
@@ -195,6 +211,19 @@ impl<'a> TilePainter<'_, 'a, '_> {
             coverage: 1.0,
         }
     }
+}
+
+/// Returns eight vectors one by one; what is not finite is zero.
+#[inline(always)]
+fn in_a_row(v: Vec3x8) -> [Vec3; LANES] {
+    let most = F32x8::splat(f32::INFINITY);
+    let is_finite = most.above(v.x.abs()) & most.above(v.y.abs()) & most.above(v.z.abs());
+    let v = Vec3x8::pick(is_finite, v, Vec3x8::splat(Vec3::ZERO));
+    let mut row = [Vec3::ZERO; LANES];
+    for (lane, one) in row.iter_mut().enumerate() {
+        *one = v.get(lane);
+    }
+    row
 }
 
 pub(crate) fn finite(v: Vec3) -> Vec3 {

@@ -7,6 +7,7 @@
 //! Cracks around a corner of pixels are joined.
 
 use crate::eight::difference;
+use crate::spans::{SPAN, Spans, Stretch};
 use crate::stroke::{Kind, Stroke};
 use crate::style::{Style, Styles};
 use glam::{DVec3, Vec3};
@@ -20,12 +21,10 @@ const JUMP: f32 = 0.01;
 /// Colors of one body that differ by less are of one material.
 const OTHER_COLOR: f32 = 0.02;
 
-/// Pixels of which one look tells whether there may be a line: most of most pictures show nothing, or one body.
-const SPAN: usize = 64;
-
 /// What is looked at.
 pub(crate) struct Surfaces<'a> {
     pub(crate) visible: &'a Framebuffer,
+    pub(crate) spans: &'a Spans,
     pub(crate) view: View<'a>,
     pub(crate) styles: &'a Styles,
     /// How large a pixel is at distance 1, or for parallel rays at any.
@@ -116,7 +115,7 @@ impl Surfaces<'_> {
     fn mark_right(&self, y: u32, scratch: &mut Scratch, row: usize) {
         let width = self.visible.width();
         let (right, set) = (&mut scratch.right[row], &mut scratch.set[row]);
-        self.each_unlike(y * width, width - 1, 1, |x| {
+        self.each_unlike([y, y], width - 1, 1, |x| {
             let crack = self.crack((x, y), (x + 1, y));
             if crack.is_some() {
                 right[x as usize] = crack;
@@ -129,7 +128,7 @@ impl Surfaces<'_> {
     fn mark_down(&self, y: u32, scratch: &mut Scratch) {
         let width = self.visible.width();
         let Scratch { down, touched, set, .. } = scratch;
-        self.each_unlike(y * width, width, width, |x| {
+        self.each_unlike([y, y + 1], width, width, |x| {
             let crack = self.crack((x, y), (x, y + 1));
             if crack.is_some() {
                 down[x as usize] = crack;
@@ -142,10 +141,12 @@ impl Surfaces<'_> {
         touched.dedup();
     }
 
-    /// Visits the pixels of a row that differ from those `step` further on. Most do not, which is quickly seen.
+    /// Visits the pixels of a row that differ from those `step` further on, which are in the other row. Most do not,
+    /// which is quickly seen.
     #[inline(always)]
-    fn each_unlike(&self, first: u32, count: u32, step: u32, mut visit: impl FnMut(u32)) {
-        let (first, count, step) = (first as usize, count as usize, step as usize);
+    fn each_unlike(&self, rows: [u32; 2], count: u32, step: u32, mut visit: impl FnMut(u32)) {
+        let first = (rows[0] * self.visible.width()) as usize;
+        let (count, step, [here, there]) = (count as usize, step as usize, rows.map(|y| self.spans.row(y)));
         let plane = self.visible;
         let ids = &plane.id()[first..first + count];
         let next_ids = &plane.id()[first + step..first + step + count];
@@ -157,7 +158,12 @@ impl Surfaces<'_> {
         let mut begin = 0;
         while begin < count {
             // Much that is one body is passed at once.
-            let end = count.min(begin + SPAN);
+            let (end, span) = (count.min(begin + SPAN), begin / SPAN);
+            let is_empty = (here[span] == Stretch::Empty) & (there[span] == Stretch::Empty);
+            if is_empty && next_ids[end - 1] == 0 {
+                begin = end;
+                continue;
+            }
             let id = ids[begin];
             let differ =
                 difference::<SPAN>(&ids[begin..end], id) | difference::<SPAN>(&next_ids[begin..end], id);

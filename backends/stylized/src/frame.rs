@@ -1,6 +1,7 @@
 //! How is a frame drawn: lines are found and paint is laid on, with buffers that stay from frame to frame?
 
 use crate::cracks::{self, Surfaces};
+use crate::ground::Ground;
 use crate::ink::Sheaf;
 use crate::light::Lighting;
 use crate::look::Look;
@@ -8,6 +9,7 @@ use crate::outline::{self, Sight, keeps_lines};
 use crate::paint::{Painting, ROWS, Scratch};
 use crate::paper::Grain;
 use crate::prepare::Outlines;
+use crate::spans::Spans;
 use crate::style::Styles;
 use glam::DVec3;
 use polyptych_core::camera::{Camera, Projection};
@@ -34,6 +36,8 @@ pub(crate) struct Buffers {
     outline: outline::Scratch,
     cracks: Vec<cracks::Scratch>,
     pub(crate) lines: Sheaf,
+    spans: Spans,
+    ground: Ground,
     bands: Vec<Mutex<Scratch>>,
     /// For cameras that bend lines: nothing has them from its edges.
     without: Vec<bool>,
@@ -47,6 +51,8 @@ impl Default for Buffers {
             outline: outline::Scratch::default(),
             cracks: Vec::new(),
             lines: Sheaf::default(),
+            spans: Spans::default(),
+            ground: Ground::default(),
             bands: Vec::new(),
             without: Vec::new(),
         }
@@ -57,7 +63,11 @@ impl Buffers {
     pub(crate) fn bytes(&self) -> u64 {
         let bands: usize = self.bands.iter().filter_map(|b| b.lock().ok()).map(|b| b.bytes()).sum();
         let cracks: usize = self.cracks.iter().map(cracks::Scratch::bytes).sum();
-        self.visible.bytes() + self.outline.bytes() + self.lines.bytes() + (bands + cracks) as u64
+        self.visible.bytes()
+            + self.outline.bytes()
+            + self.lines.bytes()
+            + self.spans.bytes()
+            + (bands + cracks) as u64
     }
 
     pub(crate) fn reserve(&mut self, width: u32, height: u32, channels: Channels, objects: usize) {
@@ -79,8 +89,9 @@ impl Buffers {
         camera: &Camera,
         control: &Control<'_>,
     ) -> Result<(), Cancelled> {
-        let Self { visible, outline, cracks, lines, without, .. } = self;
+        let Self { visible, outline, cracks, lines, spans, without, .. } = self;
         let visible = &*visible;
+        spans.fill(visible, control.threads);
         lines.strokes.clear();
         if !ready.styles.draw_lines() {
             return Ok(());
@@ -96,6 +107,7 @@ impl Buffers {
         control.check()?;
         let surfaces = Surfaces {
             visible,
+            spans,
             view,
             styles: &ready.styles,
             pixel: view.pixel_size(1.0),
@@ -155,6 +167,8 @@ impl Buffers {
             light: Lighting::of(&ready.lights),
             grain,
             lines: &self.lines,
+            spans: &self.spans,
+            ground_stays: self.ground.begin(target, &ready.styles.all[0], scene, camera),
             depths,
             any_coded: self.looks.iter().any(|look| look.is_coded),
         };
@@ -167,6 +181,7 @@ impl Buffers {
             }
         });
         control.check()?;
+        self.ground.end(target, &ready.styles.all[0], scene, camera);
         phases.end("tone");
         Ok(())
     }

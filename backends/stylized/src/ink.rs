@@ -1,5 +1,6 @@
 //! How do lines become shares of pixels?
 
+use crate::spans::SPAN;
 use crate::stroke::{Kind, Stroke};
 use crate::style::Styles;
 use glam::Vec3;
@@ -110,18 +111,19 @@ impl Ink {
         }
     }
 
-    /// Lays the lines of a row over its colors.
+    /// Lays the lines of a row over its colors. Stretches with lines hold no mere background.
     #[inline(always)]
-    pub(crate) fn blend(&self, row: u32, styles: &Styles, colors: &mut [Vec3]) {
+    pub(crate) fn blend(&self, row: u32, styles: &Styles, grounded: &mut [bool], colors: &mut [Vec3]) {
         let row = row as usize;
         if !self.touched[row] {
             return;
         }
         let words = &self.words[row * self.stride..][..colors.len()];
-        for (words, colors) in words.chunks(8).zip(colors.chunks_mut(8)) {
+        for (at, (words, colors)) in words.chunks(LANES).zip(colors.chunks_mut(LANES)).enumerate() {
             if words.iter().fold(0, |any, w| any | w) == 0 {
                 continue;
             }
+            grounded[at * LANES / SPAN] = false;
             for (word, color) in words.iter().zip(colors).filter(|(word, _)| **word != 0) {
                 let kind = Kind::ALL[usize::from(word & 7).min(Kind::ALL.len() - 1)];
                 let pen = styles.all[usize::from(word >> 3 & 31)].pen(kind);

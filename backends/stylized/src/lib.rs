@@ -12,6 +12,7 @@
 //!  prepare    edges of meshes, texture coordinates as colors         (prepare)
 //!  edges      what lies on both sides of each edge of a mesh         (prepare)
 //!  bake       maps of strokes                                        (prepare)
+//!  spans      where nothing is seen
 //!  outline    lines of meshes, from their edges
 //!  cracks     lines of everything else, between pixels
 //!  veil       how far one sees in a part of the picture
@@ -20,6 +21,7 @@
 //!  tone       two colors, and steps
 //!  hatch      strokes on dark tones
 //!  paper      what is under a drawing
+//!  ground     what is there where nothing is seen
 //!  look       how an object takes paint
 //!  eight      what is at eight pixels
 //!  lay        highlights and strokes on eight pixels
@@ -37,6 +39,7 @@ mod crossings;
 mod edges;
 mod eight;
 mod frame;
+mod ground;
 mod hatch;
 mod info;
 mod ink;
@@ -49,6 +52,7 @@ mod paper;
 mod prepare;
 mod preset;
 mod renderer;
+mod spans;
 mod stroke;
 mod style;
 mod svg;

@@ -5,7 +5,8 @@ use crate::ink::{Ink, Sheaf};
 use crate::light::Lighting;
 use crate::look::Look;
 use crate::paper::Grain;
-use crate::style::{Highlight, Paper, Show, Style, Styles};
+use crate::spans::{SPAN, Spans, Stretch};
+use crate::style::{Highlight, Show, Style, Styles};
 use glam::{DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection, RowDirections, View};
 use polyptych_core::framebuffer::{Band, Framebuffer};
@@ -15,10 +16,6 @@ use polyptych_core::shade::fogged;
 
 /// Rows drawn by one worker at a time.
 pub(crate) const ROWS: u32 = 32;
-/// Columns that are looked at, and whose background is filled, at once.
-const SPAN: usize = 64;
-/// Columns over which its color changes evenly.
-const EVEN: usize = 16;
 
 /// Buffers of a band.
 #[derive(Default)]
@@ -26,11 +23,13 @@ pub(crate) struct Scratch {
     /// Cosines to the light of the band's rows, and of one more on each side.
     facing: Vec<f32>,
     pub(crate) ink: Ink,
+    /// Which stretches of its rows hold the background, and nothing else.
+    grounded: Vec<bool>,
 }
 
 impl Scratch {
     pub(crate) fn bytes(&self) -> usize {
-        self.facing.capacity() * 4 + self.ink.bytes()
+        self.facing.capacity() * 4 + self.ink.bytes() + self.grounded.capacity()
     }
 }
 
@@ -45,6 +44,9 @@ pub(crate) struct Painting<'a> {
     pub(crate) light: Lighting<'a>,
     pub(crate) grain: &'a Grain,
     pub(crate) lines: &'a Sheaf,
+    pub(crate) spans: &'a Spans,
+    /// Whether stretches that hold the background may keep it.
+    pub(crate) ground_stays: bool,
     /// Nearest and farthest distance of the scene, to show depth.
     pub(crate) depths: [f32; 2],
     pub(crate) any_coded: bool,
@@ -59,7 +61,9 @@ impl Painting<'_> {
     #[inline(always)]
     fn band(&self, band: &mut Band<'_>, scratch: &mut Scratch) {
         let (width, first) = (band.width, band.first_row);
-        let Scratch { facing, ink } = scratch;
+        let Scratch { facing, ink, grounded } = scratch;
+        let columns = (width as usize).div_ceil(SPAN);
+        grounded.resize(columns * band.rows as usize, false);
         let stride = width as usize + 2 * LANES;
         facing.resize(stride * (ROWS as usize + 2), 0.0);
         let lines = self.styles.draw_lines();
@@ -90,9 +94,10 @@ impl Painting<'_> {
                 next += 1;
             }
             let colors = &mut band.color[(row * width) as usize..((row + 1) * width) as usize];
-            self.row(y, (row as usize + 1) * stride, stride, facing, colors);
+            let grounded = &mut grounded[row as usize * columns..][..columns];
+            self.row(y, (row as usize + 1) * stride, stride, facing, grounded, colors);
             if lines {
-                ink.blend(row, self.styles, colors);
+                ink.blend(row, self.styles, grounded, colors);
             }
         }
     }
@@ -102,19 +107,15 @@ impl Painting<'_> {
     fn face(&self, y: u32, facing: &mut [f32]) {
         let width = self.visible.width() as usize;
         let row = y as usize * width;
-        let ids = &self.visible.id()[row..row + width];
         let directions = self.view.row(y);
         let (mut x, mut few) = (0, Few::default());
-        while x < width {
-            // Where there is nothing, many columns are passed at once.
+        for stretch in self.spans.row(y) {
             let end = width.min(x + SPAN);
-            let span = &ids[x..end];
-            if union::<SPAN>(span) == 0 {
+            if *stretch == Stretch::Empty {
                 facing[LANES + x..LANES + end.next_multiple_of(LANES)].fill(0.0);
                 x = end;
-                continue;
             }
-            let is_full = !lacks::<SPAN>(span);
+            let is_full = *stretch == Stretch::Full;
             while x < end {
                 let count = (width - x).min(LANES);
                 let out = &mut facing[LANES + x..LANES + x + LANES];
@@ -182,23 +183,29 @@ impl Painting<'_> {
 
     /// Paints a row without its lines. `own` is where its cosines begin.
     #[inline(always)]
-    fn row(&self, y: u32, own: usize, stride: usize, facing: &[f32], colors: &mut [Vec3]) {
+    fn row(
+        &self,
+        y: u32,
+        own: usize,
+        stride: usize,
+        facing: &[f32],
+        grounded: &mut [bool],
+        colors: &mut [Vec3],
+    ) {
         let width = colors.len();
         let directions = self.view.row(y);
-        let paper = &self.styles.all[0].paper;
         let row = y as usize * width;
-        let ids = &self.visible.id()[row..row + width];
         let (mut x, mut few) = (0, Few::default());
-        while x < width {
+        for (stretch, grounded) in self.spans.row(y).iter().zip(grounded) {
             let end = width.min(x + SPAN);
-            let span = &ids[x..end];
-            let (is_empty, is_full) = (union::<SPAN>(span) == 0, !lacks::<SPAN>(span));
-            if !is_full {
-                self.ground(paper, x as u32, y, directions.as_ref(), &mut colors[x..end]);
+            let (is_empty, is_full) = (*stretch == Stretch::Empty, *stretch == Stretch::Full);
+            let stays = self.ground_stays && *grounded && is_empty;
+            if !is_full && !stays {
+                self.ground(x as u32, y, directions.as_ref(), &mut colors[x..end]);
             }
+            *grounded = is_empty;
             if is_empty {
                 x = end;
-                continue;
             }
             while x < end {
                 let count = (width - x).min(LANES);
@@ -243,35 +250,6 @@ impl Painting<'_> {
                         *color = result.get(lane);
                     }
                 }
-            }
-        }
-    }
-
-    /// Fills a row with what is there where nothing is.
-    #[inline(always)]
-    fn ground(&self, paper: &Paper, x: u32, y: u32, directions: Option<&RowDirections>, colors: &mut [Vec3]) {
-        let show = self.styles.all[0].show;
-        if show != Show::Style {
-            colors.fill(Vec3::ZERO);
-        } else if paper.is_shown {
-            self.grain.paper(paper, x, y, colors);
-        } else if let Some(directions) = directions {
-            // Between places so near the background's color changes evenly.
-            let gradient = self.scene.environment.background.gradient();
-            let color_at = |column: u32| gradient.color(directions.at(column).y);
-            let mut begin = color_at(x);
-            for (piece, colors) in (1..).zip(colors.chunks_mut(EVEN)) {
-                let end = color_at(x + piece * EVEN as u32);
-                let step = (end - begin) * (1.0 / EVEN as f32);
-                for (i, color) in colors.iter_mut().enumerate() {
-                    *color = begin + step * i as f32;
-                }
-                begin = end;
-            }
-        } else {
-            for (x, color) in (x..).zip(colors) {
-                let ray = self.view.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
-                *color = ray.map_or(Vec3::ZERO, |r| self.scene.environment.background.color(r.direction));
             }
         }
     }

@@ -39,6 +39,10 @@ impl Veil {
                 for distance in rest {
                     most.0[0] = most.0[0].max(*distance);
                 }
+                // Nothing is farther than the background.
+                if most.at_least(F32x8::splat(f32::INFINITY)).any() {
+                    break;
+                }
             }
             *farthest = most.0.into_iter().fold(0.0, f32::max);
         });

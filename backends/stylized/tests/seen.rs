@@ -4,7 +4,8 @@ mod common;
 
 use common::{Easel, ball, central, cube, scene};
 use glam::{DVec3, Vec3};
-use polyptych_core::framebuffer::{Channel, Channels};
+use polyptych_core::convert::Converter;
+use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::parallel::{OneThread, Pool};
 use polyptych_core::scene::{Primitive, Scene, Shape, Voxels};
 use polyptych_core::seam::{Control, RenderError, Renderer};
@@ -91,7 +92,7 @@ fn an_object_may_have_a_style_of_its_own() {
     };
     let (gooch, toon) = (draw(&[]), draw(&[("preset", "toon")]));
     let both = draw(&[("styles", "thing 1 = toon")]);
-    let half = |picture: &polyptych_core::framebuffer::Framebuffer, right: bool| -> Vec<Vec3> {
+    let half = |picture: &Framebuffer, right: bool| -> Vec<Vec3> {
         let own = |i: &usize| (*i as u32 % SIZE >= SIZE / 2) == right;
         (0..(SIZE * SIZE) as usize).filter(own).map(|i| picture.color()[i]).collect()
     };
@@ -159,11 +160,50 @@ fn a_frame_is_stopped_and_the_next_one_is_whole() {
     let mut easel = Easel::with_channels(&scene, camera, [SIZE; 2], &[("preset", "ink")], Channels::ALL);
     let whole = easel.picture();
     let stop = AtomicBool::new(true);
-    let mut target = polyptych_core::framebuffer::Framebuffer::new(SIZE, SIZE, Channels::ALL);
+    let mut target = Framebuffer::new(SIZE, SIZE, Channels::ALL);
     let control = Control::new(&OneThread).cancelled_by(&stop);
     let frame = easel.need.frame();
     assert_eq!(easel.renderer.render(&frame, &mut target, &control).unwrap_err(), RenderError::Cancelled);
     assert!(whole.same_bits(&easel.picture()));
+}
+
+#[test]
+fn a_background_that_stays_is_the_one_that_would_be_painted() {
+    // Wider than two stretches of columns, so that bodies and lines leave some of a row and come to others.
+    let size = [200, 70];
+    let at = |x: f64| {
+        let body = (Shape::Primitive(Primitive::Torus { major: 0.5, minor: 0.18 }), DVec3::new(x, 0.2, 0.1));
+        scene(vec![body], DVec3::new(0.5, 0.8, 0.6))
+    };
+    let camera = |y: f64| central(DVec3::new(0.0, y, 4.6), 0.7);
+    let wide = ("silhouette.width", "6");
+    let mut target = Framebuffer::new(size[0], size[1], Channels::COLOR);
+    let mut easel = Easel::new(&at(0.0), camera(0.5), size, &[]);
+    let mut check = |x: f64, y: f64, settings: &[(&str, &str)], spoil: bool| {
+        let scene = at(x);
+        let mut fresh = Easel::new(&scene, camera(y), size, settings);
+        easel.need = fresh.need.clone();
+        easel.renderer.prepare(&scene, &easel.need, &Converter::default(), &Control::simple()).unwrap();
+        let stop = AtomicBool::new(true);
+        let stopped = Control::new(&OneThread).cancelled_by(&stop);
+        if spoil {
+            target.band().color.fill(Vec3::X);
+            easel.renderer.render(&easel.need.frame(), &mut target, &stopped).unwrap_err();
+        }
+        target.touch();
+        easel.renderer.render(&easel.need.frame(), &mut target, &Control::simple()).unwrap();
+        assert!(target.same_bits(&fresh.picture()), "{x} {y} {settings:?} {spoil}");
+    };
+    for settings in
+        [&[][..], &[wide], &[("preset", "pencil")], &[("preset", "pencil"), ("paper.color", "#445566")]]
+    {
+        for (x, y) in [(-1.5, 0.5), (-1.4, 0.5), (1.5, 0.5), (1.5, 0.6), (9.0, 0.6), (0.0, 0.6)] {
+            check(x, y, settings, false);
+        }
+        check(0.1, 0.6, settings, true);
+    }
+    check(0.1, 0.6, &[("show", "normals")], false);
+    check(0.1, 0.6, &[], false);
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! Pictures on surfaces: bilinear lookups in a chain of halved pictures.
 
+mod lookups;
+
+use crate::lanes::F32x8;
 use crate::shade::linear_from_srgb;
 use glam::{Vec2, Vec3, Vec4};
 use schemars::JsonSchema;
@@ -49,10 +52,13 @@ pub fn texture_lookups() -> u64 {
     LOOKUPS.load(std::sync::atomic::Ordering::Relaxed)
 }
 
-/// Linear light in `[0, 1]` is stored in 16 bits, so that dark sRGB steps stay apart.
-const FULL: f32 = 65535.0;
+/// One over the texels of a pixel whose lookups are as wide as it at the full picture: see [`Texture::lod`].
+const FINEST: f32 = 1.0 / 3.0;
 
 impl Texture {
+    /// What 1 is stored as: linear light in 16 bits, so that dark sRGB steps stay apart.
+    pub const FULL: f32 = 65535.0;
+
     /// Builds a texture from 8-bit sRGB pixels with linear alpha, row 0 at the top, `4 * width * height` bytes.
     ///
     /// # Panics
@@ -62,7 +68,7 @@ impl Texture {
         assert!(width > 0 && height > 0, "a texture needs at least one texel, got {width}x{height}");
         assert_eq!(rgba.len(), 4 * width as usize * height as usize, "bytes of a {width}x{height} texture");
         let table: Vec<u16> =
-            (0..=255u32).map(|b| (linear_from_srgb(b as f32 / 255.0) * FULL).round() as u16).collect();
+            (0..=255u32).map(|b| (linear_from_srgb(b as f32 / 255.0) * Self::FULL).round() as u16).collect();
         let texels = rgba
             .chunks_exact(4)
             .map(|p| {
@@ -125,15 +131,10 @@ impl Texture {
     /// Samples by bilinear interpolation in the two levels around `lod` (trilinear; level 0 alone for `lod <= 0`).
     ///
     /// Coordinates that are not finite read as 0. Returns linear RGBA in `[0, 1]`.
+    ///
+    /// See [`Texture::add_samples`] for eight at once.
     #[must_use]
     pub fn sample(&self, uv: [f32; 2], lod: f32) -> Vec4 {
-        self.sample_here(uv, lod)
-    }
-
-    /// The same in the caller's instructions, for kernels that are compiled for wide registers.
-    #[must_use]
-    #[inline(always)]
-    pub fn sample_here(&self, uv: [f32; 2], lod: f32) -> Vec4 {
         #[cfg(debug_assertions)]
         LOOKUPS.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         let [u, v] = uv;
@@ -143,7 +144,9 @@ impl Texture {
         let below = lod as usize;
         let part = lod - below as f32;
         let near = self.levels[below].bilinear(uv, self.wrap);
-        if part == 0.0 { near } else { near.lerp(self.levels[below + 1].bilinear(uv, self.wrap), part) }
+        let mean =
+            if part == 0.0 { near } else { mix(near, self.levels[below + 1].bilinear(uv, self.wrap), part) };
+        mean / Self::FULL
     }
 
     /// Samples along the three axes and blends by the fourth power of the normal's components.
@@ -164,23 +167,16 @@ impl Texture {
     }
 
     /// Returns the mip level whose lookups are as wide as a pixel, from the change of the texture coordinates over one
-    /// pixel to the right and one down (the longer one decides); see [`Texture::level_of`].
-    #[must_use]
-    pub fn lod(&self, duv_dx: Vec2, duv_dy: Vec2) -> f32 {
-        let size = Vec2::new(self.levels[0].width as f32, self.levels[0].height as f32);
-        Self::level_of((duv_dx * size).length_squared().max((duv_dy * size).length_squared()), f32::log2)
-    }
-
-    /// Returns the mip level whose lookups are as wide as a pixel that so many texels, squared, run past.
+    /// pixel to the right and one down: the longer one decides.
     ///
     /// A texel of width `t` is the mean of a square and is weighted by a tent, with variances of `t^2 / 12` and
     /// `t^2 / 6`; the mean over a pixel of width `p` has one of `p^2 / 12`. Both are equal for `t = p / sqrt(3)`. At the
     /// level of `t = p` everything would be blurred over almost two pixels.
     #[must_use]
-    #[inline(always)]
-    pub fn level_of(texels_squared: f32, log2: impl Fn(f32) -> f32) -> f32 {
-        let ratio = texels_squared * (1.0 / 3.0);
-        if ratio > 1.0 && ratio.is_finite() { 0.5 * log2(ratio) } else { 0.0 }
+    pub fn lod(&self, duv_dx: Vec2, duv_dy: Vec2) -> f32 {
+        let size = Vec2::new(self.levels[0].width as f32, self.levels[0].height as f32);
+        let ratio = (duv_dx * size).length_squared().max((duv_dy * size).length_squared()) * FINEST;
+        if ratio > 1.0 && ratio.is_finite() { 0.5 * ratio.log2() } else { 0.0 }
     }
 }
 
@@ -221,14 +217,33 @@ impl Level {
         let (x0, x1, fx) = neighbors(uv[0], self.width, wrap[0]);
         let (y0, y1, fy) = neighbors(uv[1], self.height, wrap[1]);
         let (upper, lower) = (y0 * self.width, y1 * self.width);
-        let at = |i: u32| {
-            let [r, g, b, a] = self.texels[i as usize];
-            Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
-        };
-        let (above, below) =
-            (at(upper + x0).lerp(at(upper + x1), fx), at(lower + x0).lerp(at(lower + x1), fx));
-        above.lerp(below, fy) / FULL
+        self.mixed([upper + x0, upper + x1, lower + x0, lower + x1], [fx, fy])
     }
+
+    /// Mixes four texels, two of a row and two of the next, by the shares of the right and lower ones; 65535 = 1.
+    #[inline(always)]
+    fn mixed(&self, [a, b, c, d]: [u32; 4], [right, down]: [f32; 2]) -> Vec4 {
+        let (upper, lower) = (self.pair(a, b), self.pair(c, d));
+        let [r, g, b, a, next @ ..] = (upper + (lower - upper) * F32x8::splat(down)).0.values();
+        mix(Vec4::new(r, g, b, a), Vec4::from_array(next), right)
+    }
+
+    /// Reads two texels, which mostly lie side by side.
+    #[inline(always)]
+    fn pair(&self, first: u32, second: u32) -> F32x8 {
+        let at = first as usize;
+        let both = match self.texels.get(at..at + 2) {
+            Some(&[a, b]) if second == first + 1 => [a, b],
+            _ => [self.texels[at], self.texels[second as usize]],
+        };
+        F32x8::from_u16(bytemuck::must_cast(both))
+    }
+}
+
+/// Mixes such that two equal ones give themselves.
+#[inline(always)]
+fn mix(a: Vec4, b: Vec4, share: f32) -> Vec4 {
+    a + (b - a) * share
 }
 
 /// Returns which of `full` texels make texel `i` of `half`: two, or three at the end of an odd row.
