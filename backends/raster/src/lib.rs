@@ -17,7 +17,8 @@
 //!  layers     fragments of see-through triangles, sorted per pixel
 //!  face       a visible triangle set up once a tile: where rays meet it, normals, texture with its mip level
 //!  octet      the same in lanes for pixels that show a triangle each
-//!  color      textures and colors of corners
+//!  color      colors and opacities of eight points, by material
+//!  texels     what eight pixels see of a texture
 //!  batch      eight visible pixels at once: distances, places, unit normals
 //!  light      the lighting equation of the core over a batch, with shadows
 //!  lookup     what stands between eight points and a light, by triangles that a map names
