@@ -4,8 +4,8 @@ mod common;
 
 use common::{model, models};
 use polyptych::convert::{Converter, Detail, Filling};
-use polyptych::parallel::OneThread;
 use polyptych::prelude::*;
+use polyptych::seam::Control;
 use std::f64::consts::PI;
 
 /// Volumes and areas of the truth set.
@@ -42,7 +42,7 @@ fn conversions_agree_with_closed_forms_within_their_bounds() {
         for shape in [Shape::Primitive(primitive), Shape::FreeForm(form)] {
             let object = Object::new("truth", shape, 0);
             let detail = Detail { tolerance: 0.004, max_resolution: 256 };
-            let mesh = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+            let mesh = converter.mesh(&scene, &object, detail, &Control::simple()).unwrap();
             let error = (mesh.mesh.volume() - volume).abs();
             assert!(
                 error <= area * mesh.bound + 1e-5,
@@ -51,7 +51,7 @@ fn conversions_agree_with_closed_forms_within_their_bounds() {
             );
 
             let voxels = converter
-                .voxels(&scene, &object, Detail { max_resolution: 128, ..detail }, &OneThread)
+                .voxels(&scene, &object, Detail { max_resolution: 128, ..detail }, &Control::simple())
                 .unwrap();
             let cell = voxels.object_from_voxels.matrix3.determinant();
             let error = (voxels.voxels.filled() as f64 * cell - volume).abs();
@@ -62,7 +62,7 @@ fn conversions_agree_with_closed_forms_within_their_bounds() {
             );
 
             let field = converter
-                .distance(&scene, &object, Detail { max_resolution: 64, ..detail }, &OneThread)
+                .distance(&scene, &object, Detail { max_resolution: 64, ..detail }, &Control::simple())
                 .unwrap();
             let inside = field.distances.iter().filter(|d| **d >= 0.0).count() as f64 * field.step.powi(3);
             let error = (inside - volume).abs();
@@ -97,7 +97,7 @@ fn volumes_of_the_truth_set_have_their_surface_at_the_level() {
         field.transfer.points = vec![point(127.0, 0.0), point(129.0, 1.0)];
         scene.objects[0].shape = std::sync::Arc::new(Shape::Volume(field));
         let detail = Detail { tolerance: 0.01, max_resolution: 128 };
-        let mesh = Converter::default().mesh(&scene, &scene.objects[0], detail, &OneThread).unwrap();
+        let mesh = Converter::default().mesh(&scene, &scene.objects[0], detail, &Control::simple()).unwrap();
         let error = (mesh.mesh.volume() - volume).abs();
         assert!(error <= area * mesh.bound * 0.25, "{file}: off by {error}, bound {}", mesh.bound);
     }
@@ -167,7 +167,7 @@ fn shells_of_closed_meshes_stop_every_flood_and_enclose_their_volume() {
             .sum();
         for resolution in [64, 128] {
             let detail = Detail { tolerance: 0.0, max_resolution: resolution };
-            let model = Converter::default().voxels(&scene, object, detail, &OneThread).unwrap();
+            let model = Converter::default().voxels(&scene, object, detail, &Control::simple()).unwrap();
             let (through_faces, through_corners) = (dry(&model.voxels, false), dry(&model.voxels, true));
             let cell = model.object_from_voxels.matrix3.determinant();
             let bound = model.bound / object.world_from_object.matrix3.determinant().cbrt();
@@ -182,7 +182,7 @@ fn shells_of_closed_meshes_stop_every_flood_and_enclose_their_volume() {
                 let [thin, solid] = [Filling::Thin, Filling::Solid].map(|filling| {
                     let converter = Converter::default();
                     converter
-                        .voxels_filled(&scene, object, detail, filling, &OneThread)
+                        .voxels_filled(&scene, object, detail, filling, &Control::simple())
                         .unwrap()
                         .voxels
                         .clone()

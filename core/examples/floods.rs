@@ -10,6 +10,7 @@ use polyptych_core::convert::{Converter, Detail, Filling, VoxelModel};
 use polyptych_core::load::{LoadOptions, load};
 use polyptych_core::parallel::Pool;
 use polyptych_core::scene::{Mesh, Object, Scene, Shape, Voxels};
+use polyptych_core::seam::Control;
 use std::collections::HashMap;
 use std::error::Error;
 use std::path::Path;
@@ -64,7 +65,7 @@ fn model(
     pool: &Pool,
 ) -> Result<Arc<VoxelModel>, Box<dyn Error>> {
     let detail = Detail { tolerance: 0.0, max_resolution };
-    Ok(Converter::default().voxels_filled(scene, object, detail, filling, pool)?)
+    Ok(Converter::default().voxels_filled(scene, object, detail, filling, &Control::new(pool))?)
 }
 
 /// Tells for each cell, x fastest, whether it is filled.

@@ -148,17 +148,29 @@ pub fn for_each_mut<T: Send>(
     grain: usize,
     work: &(impl Fn(usize, &mut T) + Sync),
 ) {
+    for_each_piece(threads, items, grain, &|first, piece: &mut [T]| {
+        for (i, item) in piece.iter_mut().enumerate() {
+            work(first + i, item);
+        }
+    });
+}
+
+/// Calls `work(index of the first, piece)` for pieces of at most `grain` items.
+pub(crate) fn for_each_piece<T: Send>(
+    threads: &dyn Threads,
+    items: &mut [T],
+    grain: usize,
+    work: &(impl Fn(usize, &mut [T]) + Sync),
+) {
     fn halve<T: Send>(
         threads: &dyn Threads,
         items: &mut [T],
         first: usize,
         grain: usize,
-        work: &(impl Fn(usize, &mut T) + Sync),
+        work: &(impl Fn(usize, &mut [T]) + Sync),
     ) {
         if items.len() <= grain {
-            for (i, item) in items.iter_mut().enumerate() {
-                work(first + i, item);
-            }
+            work(first, items);
             return;
         }
         let middle = items.len() / 2;

@@ -4,6 +4,7 @@ use super::arguments::{ConvertArguments, PluginArguments, Representation};
 use super::{Failure, input, print};
 use polyptych::convert::{Detail, Filling};
 use polyptych::export::export;
+use polyptych::seam::Control;
 use serde_json::json;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Failure> {
@@ -43,7 +44,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Failure> {
     if filling != Filling::Natural && extension != "vox" {
         return Err(Failure::wrong_use("--filling: only voxels are filled, write a .vox file"));
     }
-    let done = export(&scene, &arguments.output, detail, filling, studio.converter(), studio.pool())
+    let control = Control::new(studio.pool());
+    let done = export(&scene, &arguments.output, detail, filling, studio.converter(), &control)
         .map_err(Failure::running)?;
     if arguments.json {
         let out = arguments.output.to_string_lossy();

@@ -2,11 +2,11 @@
 
 mod vox;
 
-use crate::convert::{Converter, Detail, DistanceModel, Filling};
+use crate::convert::{ConvertError, Converter, Detail, DistanceModel, Filling};
 use crate::math::Aabb;
-use crate::parallel::Threads;
 use crate::picture::write_whole;
 use crate::scene::{Material, Mesh, Object, Scene, Shape};
+use crate::seam::Control;
 use glam::Vec3;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -45,13 +45,13 @@ pub fn export(
     detail: Detail,
     filling: Filling,
     converter: &Converter,
-    threads: &dyn Threads,
+    control: &Control<'_>,
 ) -> Result<Exported, ExportError> {
     let refuse = |reason: String| ExportError { path: path.to_owned(), reason };
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (bytes, exported) = match extension.as_str() {
         "obj" | "glb" => {
-            let merged = Merged::of(scene, detail, converter, threads).map_err(&refuse)?;
+            let merged = Merged::of(scene, detail, converter, control).map_err(&refuse)?;
             let Shape::Mesh(mesh) = &*merged.object().shape else {
                 return Err(refuse("no triangles".to_owned()));
             };
@@ -61,14 +61,14 @@ pub fn export(
         }
         "vox" => {
             let (grids, bound, notes) =
-                voxel_scene(scene, detail, filling, converter, threads).map_err(&refuse)?;
+                voxel_scene(scene, detail, filling, converter, control).map_err(&refuse)?;
             let (bytes, what) = vox::written(&grids).map_err(&refuse)?;
             (bytes, Exported { what, bound, notes })
         }
         "nrrd" => {
-            let merged = Merged::of(scene, detail, converter, threads).map_err(&refuse)?;
+            let merged = Merged::of(scene, detail, converter, control).map_err(&refuse)?;
             let model = converter
-                .distance(&merged.scene, merged.object(), detail, threads)
+                .distance(&merged.scene, merged.object(), detail, control)
                 .map_err(|e| refuse(e.to_string()))?;
             let bound = merged.bound + model.bound;
             (nrrd(&model), Exported { what: model.why.clone(), bound, notes: merged.notes })
@@ -94,16 +94,17 @@ impl Merged {
         scene: &Scene,
         detail: Detail,
         converter: &Converter,
-        threads: &dyn Threads,
+        control: &Control<'_>,
     ) -> Result<Self, String> {
         let mut mesh = Mesh::default();
         let (mut bound, mut notes) = (0.0_f64, Vec::new());
         for object in scene.objects.iter().filter(|o| o.visible) {
-            match converter.mesh(scene, object, detail, threads) {
+            match converter.mesh(scene, object, detail, control) {
                 Ok(model) => {
                     bound = bound.max(model.bound);
                     append(&mut mesh, &model.mesh, object);
                 }
+                Err(stopped @ ConvertError::Cancelled) => return Err(stopped.to_string()),
                 Err(error) => notes.push(error.to_string()),
             }
         }
@@ -172,14 +173,14 @@ fn voxel_scene(
     detail: Detail,
     filling: Filling,
     converter: &Converter,
-    threads: &dyn Threads,
+    control: &Control<'_>,
 ) -> Result<(Scene, f64, Vec<String>), String> {
     if vox::is_lattice(scene) {
         return Ok((scene.clone(), 0.0, Vec::new()));
     }
-    let merged = Merged::of(scene, detail, converter, threads)?;
+    let merged = Merged::of(scene, detail, converter, control)?;
     let model = converter
-        .voxels_filled(&merged.scene, merged.object(), detail, filling, threads)
+        .voxels_filled(&merged.scene, merged.object(), detail, filling, control)
         .map_err(|e| e.to_string())?;
     let mut object = Object::new(scene.name.clone(), Shape::Voxels(model.voxels.clone()), 0);
     object.materials = (0..model.palette.len()).collect();

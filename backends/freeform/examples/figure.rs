@@ -13,6 +13,7 @@ use polyptych_core::parallel::Pool;
 use polyptych_core::scene::{
     Background, Form, FreeForm, Light, Material, Mesh, Object, Perturbation, Power, Primitive, Scene, Shape,
 };
+use polyptych_core::seam::Control;
 use std::error::Error;
 
 /// Middle, half axes and weight of bumps and dents; those aside of the middle come twice, mirrored.
@@ -105,7 +106,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut last = (0.0, 0.0);
     for share in [3e-2, 1e-2, 3e-3] {
         let detail = Detail { tolerance: share * size, max_resolution: 2048 };
-        let model = converter.mesh(&scene, object, detail, &pool)?;
+        let model = converter.mesh(&scene, object, detail, &Control::new(&pool))?;
         let (mesh, error) = (&model.mesh, farthest(&model.mesh, &bear()) / size);
         let bytes_of_mesh = mesh.positions.len() * 12 + mesh.triangles.len() * 12;
         println!(

@@ -140,8 +140,8 @@ pub(crate) fn material(model: &DistanceModel, p: DVec3) -> usize {
 mod tests {
     use super::*;
     use polyptych_core::convert::{Converter, Detail};
-    use polyptych_core::parallel::OneThread;
     use polyptych_core::scene::{Mesh, Object, Scene, Shape};
+    use polyptych_core::seam::Control;
 
     #[test]
     fn a_sheet_is_met_where_its_surface_is_however_thick_it_was_made() {
@@ -154,8 +154,9 @@ mod tests {
             };
             let object = Object::new("quad", Shape::Mesh(quad), 0);
             let detail = Detail { tolerance: 0.02, max_resolution: 256 };
-            let model =
-                Converter::default().distance(&Scene::default(), &object, detail, &OneThread).unwrap();
+            let model = Converter::default()
+                .distance(&Scene::default(), &object, detail, &Control::simple())
+                .unwrap();
             assert!(model.half_sheet > 0.005, "{}", model.half_sheet);
             for (x, y) in [(0.0, 0.0), (0.11, -0.07), (-0.2, 0.13)] {
                 for lean in [0.0, 0.3, 1.0] {

@@ -7,7 +7,7 @@ use crate::frame::{FrameDrawing, Scratch};
 use crate::plan::plan;
 use crate::volume::Drawing;
 use crate::world::{Body, Geometry, World};
-use polyptych_core::convert::{Converter, Detail};
+use polyptych_core::convert::{ConvertError, Converter, Detail};
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::scene::{Light, Object, Scene, Shape, ShapeKind};
 use polyptych_core::seam::{
@@ -184,7 +184,7 @@ impl Freeform {
         need: &Need,
         converter: &Converter,
         control: &Control<'_>,
-    ) -> Result<(Arc<Geometry>, Decision), String> {
+    ) -> Result<(Arc<Geometry>, Decision), ConvertError> {
         let key = Arc::as_ptr(&object.shape) as usize;
         if let Some((_, geometry)) = self.kept.get(&key) {
             return Ok((geometry.clone(), self.as_given(&object.shape)));
@@ -195,7 +195,7 @@ impl Freeform {
             return Ok((geometry, self.as_given(&object.shape)));
         }
         let detail = self.detail(need, object);
-        let model = converter.distance(scene, object, detail, control.threads).map_err(|e| e.reason)?;
+        let model = converter.distance(scene, object, detail, control)?;
         let decision = converted(object, model.bound, &model.why);
         Ok((Arc::new(Geometry::Field(model)), decision))
     }
@@ -268,7 +268,10 @@ impl Renderer for Freeform {
             control.check()?;
             let built = match seam::why_not_drawn(object) {
                 Some(why) => Err(why.to_owned()),
-                None => self.geometry(scene, object, need, converter, control),
+                None => match self.geometry(scene, object, need, converter, control) {
+                    Ok(built) => Ok(built),
+                    Err(error) => Err(error.reason()?),
+                },
             };
             decisions.push(match built {
                 Ok((geometry, decision)) => {

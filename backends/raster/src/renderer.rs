@@ -151,9 +151,7 @@ impl Raster {
         let wanted = |c: &&Conversion| c.serves(scene, object, detail);
         let model = match self.converted.iter().find(wanted) {
             Some(kept) => kept.model.clone(),
-            None => converter
-                .level(scene, object, detail, control.threads)
-                .map_err(|e| RenderError::Failed(e.to_string()))?,
+            None => converter.level(scene, object, detail, control)?,
         };
         Ok(Conversion::new(scene, object, detail, model))
     }

@@ -8,7 +8,7 @@
 //! order, G. M. Morton, *A computer oriented geodetic data base*, IBM, 1966.
 
 use glam::{DVec3, Vec3};
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::seam::{Cancelled, Control};
 
 /// A segment that two faces have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,18 +58,22 @@ struct Tree<'a> {
 }
 
 /// Finds all crossings; nothing where there are too many faces in one place.
-pub(crate) fn find(places: &[Vec3], faces: &[[u32; 3]], threads: &dyn Threads) -> Option<Vec<Crossing>> {
-    let tree = Tree::of(places, faces);
+pub(crate) fn find(
+    places: &[Vec3],
+    faces: &[[u32; 3]],
+    control: &Control<'_>,
+) -> Result<Option<Vec<Crossing>>, Cancelled> {
+    let tree = Tree::of(places, faces, control)?;
     let mut pieces = vec![(Vec::new(), 0); faces.len().div_ceil(PIECE)];
-    for_each_mut(threads, &mut pieces, 1, &|piece, (found, pairs)| {
+    control.for_each_mut(&mut pieces, 1, &|piece, (found, pairs)| {
         for first in piece * PIECE..faces.len().min((piece + 1) * PIECE) {
-            if *pairs <= MOST_PAIRS * PIECE {
+            if *pairs <= MOST_PAIRS * PIECE && !control.is_cancelled() {
                 tree.cross(first, found, pairs);
             }
         }
-    });
+    })?;
     let is_whole = pieces.iter().all(|(_, pairs)| *pairs <= MOST_PAIRS * PIECE);
-    is_whole.then(|| pieces.into_iter().flat_map(|(found, _)| found).collect())
+    Ok(is_whole.then(|| pieces.into_iter().flat_map(|(found, _)| found).collect()))
 }
 
 /// Spreads the ten lower bits of a number to every third.
@@ -82,7 +86,7 @@ fn spread(bits: u32) -> u32 {
 }
 
 impl<'a> Tree<'a> {
-    fn of(places: &'a [Vec3], faces: &'a [[u32; 3]]) -> Self {
+    fn of(places: &'a [Vec3], faces: &'a [[u32; 3]], control: &Control<'_>) -> Result<Self, Cancelled> {
         let bounds_of = |face: &[u32; 3]| {
             let corners = face.map(|corner| places[corner as usize]);
             corners.iter().fold(Bounds::NONE, |all, &p| all.and(Bounds { min: p, max: p }))
@@ -99,7 +103,9 @@ impl<'a> Tree<'a> {
                 u64::from(x | y << 1 | z << 2) << 32 | face as u64
             })
             .collect();
+        control.check()?;
         keys.sort_unstable();
+        control.check()?;
         let order: Vec<u32> = keys.into_iter().map(|key| key as u32).collect();
         let mut levels = vec![order.iter().map(|&face| own[face as usize]).collect::<Vec<_>>()];
         while let Some(last) = levels.last()
@@ -108,7 +114,7 @@ impl<'a> Tree<'a> {
             let around = |group: &[Bounds]| group.iter().fold(Bounds::NONE, |all, one| all.and(*one));
             levels.push(last.chunks(GROUP).map(around).collect());
         }
-        Self { places, faces, order, levels, least: f64::from(size.length()) * 1e-5 }
+        Ok(Self { places, faces, order, levels, least: f64::from(size.length()) * 1e-5 })
     }
 
     /// Finds where a face is crossed by those after it in the order.
@@ -183,11 +189,10 @@ impl<'a> Tree<'a> {
 mod tests {
     use super::*;
     use crate::edges::tests::cube;
-    use polyptych_core::parallel::OneThread;
     use polyptych_core::scene::Mesh;
 
     fn crossings(mesh: &Mesh) -> Option<Vec<Crossing>> {
-        find(&mesh.positions, &mesh.triangles, &OneThread)
+        find(&mesh.positions, &mesh.triangles, &Control::simple()).unwrap()
     }
 
     /// A cube and another one that sticks in it.

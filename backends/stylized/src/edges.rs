@@ -5,8 +5,8 @@
 
 use crate::crossings;
 use glam::Vec3;
-use polyptych_core::parallel::Threads;
 use polyptych_core::scene::Mesh;
+use polyptych_core::seam::{Cancelled, Control};
 use std::collections::HashMap;
 
 /// No face on that side.
@@ -61,11 +61,11 @@ impl Edges {
     /// Finds the edges of a mesh. Triangles without area have none.
     #[cfg(test)]
     pub(crate) fn of(mesh: &Mesh) -> Self {
-        Self::new(mesh, None)
+        Self::new(mesh, false, &Control::simple()).unwrap()
     }
 
-    /// Finds the edges of a mesh, and with threads to do it on where it crosses itself.
-    pub(crate) fn new(mesh: &Mesh, threads: Option<&dyn Threads>) -> Self {
+    /// Finds the edges of a mesh, and if asked to where it crosses itself.
+    pub(crate) fn new(mesh: &Mesh, crossings: bool, control: &Control<'_>) -> Result<Self, Cancelled> {
         let mut places = Vec::new();
         let mut known: HashMap<[u32; 3], u32, Mixed> =
             HashMap::with_capacity_and_hasher(mesh.positions.len(), Mixed::default());
@@ -85,6 +85,7 @@ impl Edges {
         let mut slots = Vec::with_capacity(mesh.triangles.len());
         let mut faces = Vec::new();
         for (t, triangle) in mesh.triangles.iter().enumerate() {
+            control.check()?;
             let corners = triangle.map(|i| corner_of[i as usize]);
             let [a, b, c] = corners.map(|i| all.places[i as usize].as_dvec3());
             let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
@@ -92,7 +93,7 @@ impl Edges {
             let n = normal.as_vec3();
             all.planes.push([n.x, n.y, n.z, normal.dot(a) as f32]);
             slots.push(mesh.slot(t) as u16);
-            if threads.is_some() {
+            if crossings {
                 faces.push(corners);
             }
             for i in 0..3 {
@@ -103,20 +104,21 @@ impl Edges {
         }
         halves.sort_unstable();
         for same in halves.chunk_by(|a, b| a.0 == b.0) {
+            control.check()?;
             all.add(same, &slots);
         }
         all.is_closed &= !all.planes.is_empty();
-        if let Some(threads) = threads {
-            all.cross(&faces, threads);
+        if crossings {
+            all.cross(&faces, control)?;
         }
-        all
+        Ok(all)
     }
 
     /// Adds where the faces of these corners cross.
-    fn cross(&mut self, faces: &[[u32; 3]], threads: &dyn Threads) {
-        let Some(crossings) = crossings::find(&self.places, faces, threads) else {
+    fn cross(&mut self, faces: &[[u32; 3]], control: &Control<'_>) -> Result<(), Cancelled> {
+        let Some(crossings) = crossings::find(&self.places, faces, control)? else {
             self.crossed = Crossed::TooOften;
-            return;
+            return Ok(());
         };
         self.crossed = Crossed::Found;
         for crossing in crossings {
@@ -132,6 +134,7 @@ impl Edges {
                 crosses: true,
             });
         }
+        Ok(())
     }
 
     fn add(&mut self, same: &[(u64, u32)], slots: &[u16]) {

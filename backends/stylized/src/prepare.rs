@@ -66,6 +66,25 @@ impl Outlines {
         control: &Control<'_>,
     ) -> Result<(), RenderError> {
         let before = std::mem::take(&mut self.kept);
+        let built = self.build(&before, scene, decisions, styles, need, converter, control);
+        if built.is_err() {
+            // The next try need not find again what was found.
+            self.kept.extend(before);
+        }
+        built
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "those of `prepare`, and what was found before")]
+    fn build(
+        &mut self,
+        before: &[(Source, Arc<Edges>)],
+        scene: &Scene,
+        decisions: &[Decision],
+        styles: &Styles,
+        need: &Need,
+        converter: &Converter,
+        control: &Control<'_>,
+    ) -> Result<(), RenderError> {
         self.bodies.clear();
         self.outlined.clear();
         self.outlined.resize(scene.objects.len(), false);
@@ -85,17 +104,20 @@ impl Outlines {
                 Source::Given(shape) => Arc::as_ptr(shape) as usize,
                 Source::Converted(model) => Arc::as_ptr(model) as usize,
             };
-            let at = *found.entry(key).or_insert_with(|| {
+            let at = if let Some(&at) = found.get(&key) {
+                at
+            } else {
                 let serves = |edges: &Edges| !crossings || edges.crossed != Crossed::Unknown;
                 let same = before.iter().find(|(old, edges)| old.is(&source) && serves(edges));
                 let edges = match (same, source.mesh()) {
                     (Some((_, edges)), _) => edges.clone(),
-                    (None, Some(mesh)) => Arc::new(Edges::new(mesh, crossings.then_some(control.threads))),
+                    (None, Some(mesh)) => Arc::new(Edges::new(mesh, crossings, control)?),
                     (None, None) => Arc::default(),
                 };
                 self.kept.push((source, edges));
+                found.insert(key, self.kept.len() - 1);
                 self.kept.len() - 1
-            });
+            };
             let edges = self.kept[at].1.clone();
             self.outlined[index] = true;
             self.bodies.push(Body {
@@ -104,7 +126,8 @@ impl Outlines {
                 edges,
             });
         }
-        Ok(())
+        // A body whose conversion was stopped looks like one that has no faces.
+        Ok(control.check()?)
     }
 
     /// Lists the objects that cross themselves too often to find where.
@@ -157,7 +180,7 @@ fn source(
             | Primitive::Torus { .. },
         ) => None,
         Shape::Primitive(_) => {
-            let model = converter.mesh(scene, object, detail(object, need, FINEST), control.threads).ok()?;
+            let model = converter.mesh(scene, object, detail(object, need, FINEST), control).ok()?;
             (model.bound == 0.0).then_some(Source::Converted(model))
         }
         _ => None,

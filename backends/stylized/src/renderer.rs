@@ -76,7 +76,7 @@ impl Stylized {
         };
         let buffers = &mut self.scratch;
         buffers.reserve(width, height, ready.styles.channels(), ready.scene.objects.len());
-        inner.render(frame, &mut buffers.visible, &quiet(control))?;
+        inner.render(frame, &mut buffers.visible, &control.unwatched())?;
         buffers.find_lines(ready, &self.outlines, &frame.camera, control)?;
         Ok(&buffers.lines.strokes)
     }
@@ -132,14 +132,6 @@ impl Stylized {
             return Err(failed(format!("visibility: {id} does not deliver the channel {}", missing.name())));
         }
         Ok((id, Need { channels, settings, ..need.clone() }))
-    }
-}
-
-/// A control that tells nobody of finished bands: those of the inner picture are not the picture's.
-fn quiet<'a>(control: &Control<'a>) -> Control<'a> {
-    match control.cancel_flag() {
-        Some(flag) => Control::new(control.threads).cancelled_by(flag),
-        None => Control::new(control.threads),
     }
 }
 
@@ -233,7 +225,8 @@ impl Renderer for Stylized {
         buffers.reserve(width, height, channels, ready.scene.objects.len());
         // The inner back end draws into the target's own planes, so that none is copied.
         buffers.visible.exchange(target, lent);
-        let result = inner.render(frame, &mut buffers.visible, &quiet(control));
+        // Finished bands of the inner picture are not the picture's.
+        let result = inner.render(frame, &mut buffers.visible, &control.unwatched());
         phases.end("visibility");
         let painted = match &result {
             Ok(_) if target.channels().has(Channel::Color) => {

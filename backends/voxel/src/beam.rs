@@ -207,8 +207,8 @@ mod tests {
     use crate::grid::Chunks;
     use crate::occupancy::Values;
     use crate::walk::{Found, Moment, Walk};
-    use polyptych_core::parallel::OneThread;
     use polyptych_core::scene::Voxels;
+    use polyptych_core::seam::Control;
 
     fn random(state: &mut u64) -> f64 {
         *state ^= *state << 13;
@@ -229,7 +229,7 @@ mod tests {
                 let d = DVec3::new(f64::from(x) - 60.0, f64::from(y) - 35.0, f64::from(z) - 45.0).length();
                 u8::from((20.0..21.5).contains(&d) || (x + 2 * y + 5 * z) % 3001 == round)
             });
-            let grid = Chunks::default().grid(&voxels, all, all, &OneThread);
+            let grid = Chunks::default().grid(&voxels, all, all, &Control::simple()).unwrap();
             for _ in 0..100 {
                 let mut point = |scale: f64| {
                     DVec3::new(random(&mut state), random(&mut state), random(&mut state)) * scale

@@ -2,8 +2,8 @@
 
 use crate::masks::Masks;
 use crate::occupancy::{Nodes, Occupancy, Values};
-use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{CHUNK, Chunk, Voxels};
+use polyptych_core::seam::{Cancelled, Control};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -192,13 +192,15 @@ impl Chunks {
         voxels: &Voxels,
         seen: Values,
         blocking: Values,
-        threads: &dyn Threads,
-    ) -> Arc<Grid> {
+        control: &Control<'_>,
+    ) -> Result<Arc<Grid>, Cancelled> {
         let values = [seen, blocking];
-        let grid =
-            self.edited(voxels, values).unwrap_or_else(|| Arc::new(self.build(voxels, values, threads)));
+        let grid = match self.edited(voxels, values) {
+            Some(grid) => grid,
+            None => Arc::new(self.build(voxels, values, control)?),
+        };
         self.used.push(grid.clone());
-        grid
+        Ok(grid)
     }
 
     /// Changes a grid of before, if there is one that most chunks are those of.
@@ -221,7 +223,12 @@ impl Chunks {
     }
 
     /// Builds a grid. One of before that has chunks of it gives it its masks.
-    fn build(&mut self, voxels: &Voxels, values: [Values; 2], threads: &dyn Threads) -> Grid {
+    fn build(
+        &mut self,
+        voxels: &Voxels,
+        values: [Values; 2],
+        control: &Control<'_>,
+    ) -> Result<Grid, Cancelled> {
         let recipes: Vec<Option<Recipe>> =
             (0..voxels.chunks().len()).map(|index| Recipe::of(voxels, index)).collect();
         let wanted: HashSet<Recipe> = recipes.iter().flatten().copied().collect();
@@ -260,12 +267,12 @@ impl Chunks {
         self.built += missing.len() as u64;
         masks.reserve(missing.len());
         for missing in missing.chunks_mut(BUILT_AT_ONCE) {
-            for_each_mut(threads, missing, 1, &|_, (recipe, chunk, built)| {
+            control.for_each_mut(missing, 1, &|_, (recipe, chunk, built)| {
                 let marks = |values| Occupancy::of(chunk, recipe.end, values);
                 built[0] = marks(&values[0]);
                 // Most chunks hold nothing that is seen but lets light through: then both are one.
                 built[1] = if values[0] == values[1] { None } else { marks(&values[1]) };
-            });
+            })?;
             for (recipe, _, built) in missing {
                 let [seen, blocking] = std::mem::take(built);
                 let slot = masks.put(seen.as_deref());
@@ -283,7 +290,7 @@ impl Chunks {
         let [cx, cy, _] = voxels.chunks_per_axis().map(|c| c as usize);
         let size = voxels.size().map(|s| s as i32);
         let layer = |slots| Layer { size, row: cx, slab: cx * cy, slots, masks: masks.clone() };
-        Grid { seen: layer(seen), blocking: layer(blocking), values, voxels: voxels.clone() }
+        Ok(Grid { seen: layer(seen), blocking: layer(blocking), values, voxels: voxels.clone() })
     }
 }
 
@@ -293,7 +300,6 @@ const MOST_EDITED: usize = 64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use polyptych_core::parallel::OneThread;
     use polyptych_core::scene::{Brush, Region};
 
     #[test]
@@ -303,7 +309,7 @@ mod tests {
         let mut chunks = Chunks::default();
         let mut prepare = |voxels: &Voxels| {
             chunks.begin();
-            let grid = chunks.grid(voxels, all, all, &OneThread);
+            let grid = chunks.grid(voxels, all, all, &Control::simple()).unwrap();
             chunks.end();
             (chunks.built, grid)
         };
@@ -330,9 +336,9 @@ mod tests {
         };
         for round in 0..60 {
             chunks.begin();
-            let grid = chunks.grid(&voxels, all, solid, &OneThread);
+            let grid = chunks.grid(&voxels, all, solid, &Control::simple()).unwrap();
             chunks.end();
-            let anew = Chunks::default().grid(&voxels, all, solid, &OneThread);
+            let anew = Chunks::default().grid(&voxels, all, solid, &Control::simple()).unwrap();
             for (layer, other) in [(&grid.seen, &anew.seen), (&grid.blocking, &anew.blocking)] {
                 for chunk in 0..layer.slots.len() {
                     assert!(layer.nodes(chunk) == other.nodes(chunk), "round {round}");
@@ -351,7 +357,8 @@ mod tests {
     fn both_layers_share_masks_where_nothing_is_clear() {
         let voxels = Voxels::from_fn([128, 4, 4], |x, _, _| if x < 64 { 1 } else { 2 });
         let mut chunks = Chunks::default();
-        let grid = chunks.grid(&voxels, Values::of(|_| true), Values::of(|v| v == 1), &OneThread);
+        let grid =
+            chunks.grid(&voxels, Values::of(|_| true), Values::of(|v| v == 1), &Control::simple()).unwrap();
         let same = |i: usize| grid.seen.slots[i] == grid.blocking.slots[i];
         assert_eq!((same(0), same(1)), (true, false));
         assert_eq!(grid.blocking.slots[1], Masks::NOTHING);

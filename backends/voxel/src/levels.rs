@@ -9,8 +9,8 @@ use crate::grid::{Chunks, Grid};
 use crate::occupancy::Values;
 use glam::Vec3;
 use polyptych_core::camera::{Camera, Projection};
-use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{CHUNK, Chunk, Object, Scene, Voxels};
+use polyptych_core::seam::{Cancelled, Control};
 use std::sync::Arc;
 
 /// Cells of a finer level along the edge of a block.
@@ -87,17 +87,20 @@ pub(crate) fn of(
     object: &Object,
     grid: &Grid,
     voxels: &Voxels,
-    threads: &dyn Threads,
-) -> [Coarse; 2] {
+    control: &Control<'_>,
+) -> Result<[Coarse; 2], Cancelled> {
     let colors: Vec<Vec3> =
         (0..256usize).map(|v| scene.material(object, v.saturating_sub(1)).base_color).collect();
     let mut chunks: Vec<Vec<Block>> = vec![Vec::new(); voxels.chunks().len()];
-    for_each_mut(threads, &mut chunks, 1, &|index, blocks| *blocks = blocks_of(grid, voxels, index, &colors));
+    control.for_each_mut(&mut chunks, 1, &|index, blocks| {
+        *blocks = blocks_of(grid, voxels, index, &colors);
+    })?;
     let size = voxels.size().map(|s| s.div_ceil(BLOCK));
     let at =
         |[x, y, z]: [u32; 3], size: [u32; 3]| ((z * size[1] + y) as usize) * size[0] as usize + x as usize;
     let mut fine = vec![Block::default(); size.iter().map(|&s| s as usize).product()];
     for (index, blocks) in chunks.iter().enumerate() {
+        control.check()?;
         let first = voxels.chunk_origin(index).map(|c| c / BLOCK);
         for (i, block) in blocks.iter().enumerate() {
             let i = i as u32;
@@ -112,6 +115,7 @@ pub(crate) fn of(
     let mut coarse = vec![Block::default(); wide.iter().map(|&s| s as usize).product()];
     for z in 0..size[2] {
         for y in 0..size[1] {
+            control.check()?;
             for x in 0..size[0] {
                 let own = fine[at([x, y, z], size)];
                 if own.byte == 0 {
@@ -128,12 +132,13 @@ pub(crate) fn of(
             }
         }
     }
-    [(size, fine), (wide, coarse)].map(|(size, blocks)| {
+    let level = |size: [u32; 3], blocks: &[Block]| {
         let bytes: Vec<u8> = blocks.iter().map(|block| block.byte).collect();
         let all = Values::of(|_| true);
-        let grid = Chunks::default().grid(&Voxels::from_bytes(size, &bytes), all, all, threads);
-        Coarse { grid, colors: blocks.iter().map(|block| block.color).collect() }
-    })
+        let grid = Chunks::default().grid(&Voxels::from_bytes(size, &bytes), all, all, control)?;
+        Ok(Coarse { grid, colors: blocks.iter().map(|block| block.color).collect() })
+    };
+    Ok([level(size, &fine)?, level(wide, &coarse)?])
 }
 
 /// Collects the blocks of a chunk; none where it is empty.

@@ -1,7 +1,7 @@
 //! Which objects are grids already, which become one, and what scene results?
 
 use crate::grid::Grid;
-use polyptych_core::convert::{Converter, Detail, Filling, VoxelModel};
+use polyptych_core::convert::{ConvertError, Converter, Detail, Filling, VoxelModel};
 use polyptych_core::scene::{Object, Scene, Shape, Voxels};
 use polyptych_core::seam::{self, Control, Decision, Need, RenderError};
 use std::collections::HashMap;
@@ -69,16 +69,19 @@ pub(crate) fn build(
             continue;
         }
         let made = match skipped {
-            Some(why) => Err(why),
+            Some(why) => Err(Ok(why)),
             None => converter
-                .voxels_filled(scene, object, detail(object, need, resolution), filling, control.threads)
-                .map_err(|e| e.reason),
+                .voxels_filled(scene, object, detail(object, need, resolution), filling, control)
+                .map_err(ConvertError::reason),
         };
         match made {
-            Err(why) if object.required && object.visible => {
-                return Err(RenderError::Required { object: object.name.clone(), reason: why });
+            Err(why) => {
+                let why = why?;
+                if object.required && object.visible {
+                    return Err(RenderError::Required { object: object.name.clone(), reason: why });
+                }
+                decisions.push(Decision::Skipped { why });
             }
-            Err(why) => decisions.push(Decision::Skipped { why }),
             Ok(model) => {
                 decisions.push(converted(&object.shape, model.bound, &model.why));
                 let scene = changed.get_or_insert_with(|| (**scene).clone());

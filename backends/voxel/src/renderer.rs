@@ -18,6 +18,7 @@ use polyptych_core::seam::{
     Phases, Plan, Prepared, Registry, RenderError, Renderer, Report, Surfaces, Value,
 };
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -129,8 +130,10 @@ impl Voxel {
             let without_holes =
                 (1..=255).all(|v| material(v).alpha == AlphaMode::Opaque || material(v).texture.is_none());
             let key = (Arc::as_ptr(&object.shape).addr(), seen, blocking);
-            let grid =
-                grids.entry(key).or_insert_with(|| self.chunks.grid(voxels, seen, blocking, control.threads));
+            let grid = match grids.entry(key) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => new.insert(self.chunks.grid(voxels, seen, blocking, control)?),
+            };
             items.push(Item::new(scene, index, grid.clone(), without_holes));
         }
         Ok((items, grids.values().map(|g| g.bytes()).sum()))
@@ -154,9 +157,10 @@ fn levels_of(
             continue;
         }
         let key = (Arc::as_ptr(&object.shape).addr(), object.materials.clone());
-        let made = known
-            .entry(key)
-            .or_insert_with(|| levels::of(&model.scene, object, &item.grid, voxels, control.threads));
+        let made = match known.entry(key) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(new) => new.insert(levels::of(&model.scene, object, &item.grid, voxels, control)?),
+        };
         levels.push((index, made.clone()));
         let blocks = "blocks of 4 and 16 cells as one where they are no larger than a pixel";
         *decision = match std::mem::replace(decision, Decision::Exact) {

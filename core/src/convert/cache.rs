@@ -2,6 +2,7 @@
 
 use super::{ConvertError, Detail};
 use crate::scene::{Material, Object, Scene, Shape};
+use crate::seam::Control;
 use glam::DAffine3;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -47,21 +48,25 @@ impl<T> Cache<T> {
             .map(|e| e.model.clone())
     }
 
-    /// Finds a result or makes it; results of shapes that are gone are dropped.
+    /// Finds a result or makes it; results of shapes that are gone are dropped. What was stopped halfway is not kept.
     pub(super) fn get(
         &self,
         scene: &Scene,
         object: &Object,
         detail: Detail,
+        control: &Control<'_>,
         make: impl FnOnce(f64) -> Result<T, ConvertError>,
     ) -> Result<Arc<T>, ConvertError> {
         if let Some(model) = self.find(scene, object, detail) {
             return Ok(model);
         }
         if let Some(reason) = object.why_undrawable() {
-            return Err(ConvertError { object: object.name.clone(), reason: reason.to_owned() });
+            return Err(ConvertError::of(object, reason));
         }
-        let model = Arc::new(make(detail.in_object(object))?);
+        let made = make(detail.in_object(object));
+        // Once the host wants to stop, it does so until we return: what was made before is whole.
+        control.check()?;
+        let model = Arc::new(made?);
         let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
         entries.retain(|_, list| {
             list.retain(|e| e.shape.strong_count() > 0);

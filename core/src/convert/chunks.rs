@@ -175,14 +175,15 @@ impl<'a> Chunks<'a> {
 mod tests {
     use super::super::{Filling, voxelize};
     use super::*;
-    use crate::parallel::OneThread;
     use crate::scene::{Chunk, Primitive, Samples, TransferFunction, TransferPoint};
+    use crate::seam::Control;
     use glam::{DVec2, Vec3};
 
     /// Counts the chunks that are really taken.
     fn found(scene: &Scene, object: &Object, resolution: u32) -> u64 {
-        let voxels =
-            voxelize::voxelize(scene, object, 0.0, resolution, Filling::Natural, &OneThread).unwrap().voxels;
+        let voxels = voxelize::voxelize(scene, object, 0.0, resolution, Filling::Natural, &Control::simple())
+            .unwrap()
+            .voxels;
         let mut full = std::collections::HashSet::new();
         let chunks = voxels.chunks().iter().filter(|chunk| match chunk {
             Chunk::Uniform(value) => *value != 0 && full.insert(*value),

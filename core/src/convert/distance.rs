@@ -4,13 +4,16 @@
 //! three axes, two of three win, so small holes do no harm. Sheets that enclose nothing get a thickness of one
 //! and a half steps instead.
 
-use super::DistanceModel;
 use super::palette::{ColorCollector, ColorKey, triangle_color};
+use super::{ConvertError, DistanceModel};
 use crate::math::Aabb;
-use crate::parallel::{Threads, for_each_mut};
 use crate::scene::{Mesh, Object, Scene};
+use crate::seam::{Cancelled, Control};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
+
+/// Samples that are colored by one worker at a time: less than a millisecond's work.
+const COLORED: usize = 1024;
 
 /// Returns the number of samples along each axis and their distance.
 pub(super) fn grid_size(bounds: &Aabb, tolerance: f64, max_resolution: u32) -> ([u32; 3], f64) {
@@ -34,25 +37,25 @@ pub(super) fn of_mesh(
     mesh: &Mesh,
     tolerance: f64,
     max_resolution: u32,
-    threads: &dyn Threads,
-) -> Result<DistanceModel, String> {
+    control: &Control<'_>,
+) -> Result<DistanceModel, ConvertError> {
     let bounds = mesh.bounds();
     if bounds.is_empty() || mesh.triangles.is_empty() {
-        return Err("it has no triangles".to_owned());
+        return Err(ConvertError::of(object, "it has no triangles"));
     }
     let (size, step) = grid_size(&bounds, tolerance, max_resolution);
     let covered = DVec3::from_array(size.map(|s| f64::from(s - 1))) * step;
     let first = bounds.center() - covered * 0.5;
     let grid = Grid { size, step, first };
-    let mut nearest = nearest_triangles(mesh, &grid, threads);
-    let open = is_open(mesh);
-    let inside = if open { vec![false; nearest.len()] } else { inside_votes(mesh, &grid, threads) };
+    let mut nearest = nearest_triangles(mesh, &grid, control)?;
+    let open = is_open(mesh, control)?;
+    let inside = if open { vec![false; nearest.len()] } else { inside_votes(mesh, &grid, control)? };
     let band = step * DistanceModel::BAND;
     let half_sheet = if open { step * 0.75 } else { 0.0 };
 
     let mut noted: Vec<Option<(ColorKey, Vec3)>> = vec![None; nearest.len()];
     let mut pairs: Vec<_> = nearest.iter_mut().zip(&mut noted).collect();
-    for_each_mut(threads, &mut pairs, 4096, &|i, (near, noted)| {
+    control.for_each_mut(&mut pairs, COLORED, &|i, (near, noted)| {
         let Some(triangle) = near.triangle else { return };
         let corners = mesh.corners(triangle as usize).map(glam::Vec3::as_dvec3);
         let weights = closest_weights(corners, grid.sample(i)).as_vec3();
@@ -64,10 +67,11 @@ pub(super) fn of_mesh(
             // A hole of the texture: nothing is near.
             None => near.distance = band,
         }
-    });
+    })?;
     drop(pairs);
     let mut colors = ColorCollector::default();
     for &(key, color) in noted.iter().flatten() {
+        control.check()?;
         colors.note(key, color, 1);
     }
     let palette = colors.choose(scene, object);
@@ -135,12 +139,13 @@ struct Nearest {
 }
 
 /// Finds the nearest triangle of every sample within the band, slab by slab; ties go to the lower index.
-fn nearest_triangles(mesh: &Mesh, grid: &Grid, threads: &dyn Threads) -> Vec<Nearest> {
+fn nearest_triangles(mesh: &Mesh, grid: &Grid, control: &Control<'_>) -> Result<Vec<Nearest>, Cancelled> {
     let far = Nearest { distance: f64::INFINITY, triangle: None };
     let slab = grid.size[0] as usize * grid.size[1] as usize;
     // Triangles by the slabs that they can reach, so that threads need not share anything.
     let mut of_slab: Vec<Vec<u32>> = vec![Vec::new(); grid.size[2] as usize];
     for t in 0..mesh.triangles.len() {
+        control.check()?;
         let corners = mesh.corners(t);
         if corners.iter().all(|p| p.is_finite()) {
             let box_ = Aabb::of_points(corners.map(glam::Vec3::as_dvec3));
@@ -152,8 +157,11 @@ fn nearest_triangles(mesh: &Mesh, grid: &Grid, threads: &dyn Threads) -> Vec<Nea
     let mut nearest = vec![far; slab * grid.size[2] as usize];
     let mut slabs: Vec<(&mut [Nearest], &[u32])> =
         nearest.chunks_mut(slab).zip(of_slab.iter().map(Vec::as_slice)).collect();
-    for_each_mut(threads, &mut slabs, 1, &|z, (samples, triangles)| {
+    control.for_each_mut(&mut slabs, 1, &|z, (samples, triangles)| {
         for &t in *triangles {
+            if control.is_cancelled() {
+                return;
+            }
             let corners = mesh.corners(t as usize).map(glam::Vec3::as_dvec3);
             let box_ = Aabb::of_points(corners);
             for y in grid.span(1, box_.min.y, box_.max.y, DistanceModel::BAND) {
@@ -168,8 +176,8 @@ fn nearest_triangles(mesh: &Mesh, grid: &Grid, threads: &dyn Threads) -> Vec<Nea
                 }
             }
         }
-    });
-    nearest
+    })?;
+    Ok(nearest)
 }
 
 /// Returns the barycentric coordinates of the point of a triangle that is nearest to `p`.
@@ -211,45 +219,50 @@ pub(super) fn closest_weights([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
 }
 
 /// Tells whether more than one in a hundred edges belongs to one triangle only.
-fn is_open(mesh: &Mesh) -> bool {
-    let (border, all) = border_edges(mesh);
-    border * 100 > all
+fn is_open(mesh: &Mesh, control: &Control<'_>) -> Result<bool, Cancelled> {
+    let (border, all) = border_edges(mesh, control)?;
+    Ok(border * 100 > all)
 }
 
 /// Counts the edges that belong to one triangle only, and all edges, vertices welded to a millionth of the size.
-pub(super) fn border_edges(mesh: &Mesh) -> (usize, usize) {
+pub(super) fn border_edges(mesh: &Mesh, control: &Control<'_>) -> Result<(usize, usize), Cancelled> {
     let grid = mesh.bounds().radius().max(1e-30) * 1e-6;
     let key = |i: u32| (mesh.positions[i as usize].as_dvec3() / grid).round().to_array().map(|c| c as i64);
     let mut edges: HashMap<_, u32> = HashMap::with_capacity(mesh.triangles.len() * 2);
     for t in &mesh.triangles {
+        control.check()?;
         for k in 0..3 {
             let (a, b) = (key(t[k]), key(t[(k + 1) % 3]));
             *edges.entry(if a < b { (a, b) } else { (b, a) }).or_insert(0) += 1;
         }
     }
-    (edges.values().filter(|&&n| n == 1).count(), edges.len())
+    Ok((edges.values().filter(|&&n| n == 1).count(), edges.len()))
 }
 
 /// Tells for each sample whether it is inside, by the majority of three parity counts.
-fn inside_votes(mesh: &Mesh, grid: &Grid, threads: &dyn Threads) -> Vec<bool> {
+fn inside_votes(mesh: &Mesh, grid: &Grid, control: &Control<'_>) -> Result<Vec<bool>, Cancelled> {
     let count = grid.size.iter().map(|&s| s as usize).product();
     let mut votes = [const { Vec::new() }; 3];
-    for_each_mut(threads, &mut votes, 1, &|axis, votes| {
+    control.for_each_mut(&mut votes, 1, &|axis, votes| {
         *votes = vec![0u8; count];
-        count_crossings(mesh, grid, axis, votes);
-    });
+        count_crossings(mesh, grid, axis, votes, control);
+    })?;
     let [x, y, z] = &votes;
-    (0..count).map(|i| x[i] + y[i] + z[i] >= 2).collect()
+    Ok((0..count).map(|i| x[i] + y[i] + z[i] >= 2).collect())
 }
 
 /// Casts a line through every row of samples along an axis and adds a vote to those behind an odd number of
-/// crossings. Lines are moved by a tiny irrational step so that they miss vertices and edges on the grid.
-fn count_crossings(mesh: &Mesh, grid: &Grid, axis: usize, votes: &mut [u8]) {
+/// crossings, until the host wants to stop. Lines are moved by a tiny irrational step so that they miss vertices and
+/// edges on the grid.
+fn count_crossings(mesh: &Mesh, grid: &Grid, axis: usize, votes: &mut [u8], control: &Control<'_>) {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let nudge = [grid.step * 1.234_567e-5, grid.step * 2.718_281e-5];
     let (nu, nv) = (grid.size[u] as usize, grid.size[v] as usize);
     let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); nu * nv];
     for t in 0..mesh.triangles.len() {
+        if control.is_cancelled() {
+            return;
+        }
         let corners = mesh.corners(t).map(glam::Vec3::as_dvec3);
         if corners.iter().any(|p| !p.is_finite()) {
             continue;
@@ -268,6 +281,9 @@ fn count_crossings(mesh: &Mesh, grid: &Grid, axis: usize, votes: &mut [u8]) {
         }
     }
     for j in 0..nv {
+        if control.is_cancelled() {
+            return;
+        }
         for i in 0..nu {
             let list = &mut crossings[j * nu + i];
             list.sort_unstable_by(f64::total_cmp);
@@ -296,14 +312,13 @@ fn cross_line(corners: [DVec3; 3], axis: usize, u: usize, v: usize, line: [f64; 
 mod tests {
     use super::super::primitive_mesh;
     use super::*;
-    use crate::parallel::OneThread;
     use crate::scene::{Primitive, Shape};
 
     fn model_of(primitive: Primitive, resolution: u32) -> DistanceModel {
         let scene = Scene::default();
         let object = Object::new("o", Shape::Primitive(primitive), 0);
         let (mesh, _) = primitive_mesh::tessellate(&primitive, 1e-4);
-        of_mesh(&scene, &object, &mesh, 0.0, resolution, &OneThread).unwrap()
+        of_mesh(&scene, &object, &mesh, 0.0, resolution, &Control::simple()).unwrap()
     }
 
     fn samples(model: &DistanceModel) -> impl Iterator<Item = (DVec3, f64)> + '_ {

@@ -9,8 +9,8 @@
 
 use super::MeshSize;
 use crate::math::Aabb;
-use crate::parallel::{OneThread, Threads, for_each_mut};
 use crate::scene::{FreeForm, Mesh, Volume};
+use crate::seam::{Cancelled, Control};
 use glam::{DMat3, DVec3, Vec3};
 use std::collections::HashMap;
 
@@ -71,20 +71,25 @@ impl Field for VolumeSurface<'_> {
 ///
 /// The bound is the greatest distance found at the middles of edges and faces (first order, `|F| / |grad F|`),
 /// half as much again for what lies between.
-pub(super) fn of_form(form: &FreeForm, tolerance: f64, finest: u32, threads: &dyn Threads) -> (Mesh, f64) {
+pub(super) fn of_form(
+    form: &FreeForm,
+    tolerance: f64,
+    finest: u32,
+    control: &Control<'_>,
+) -> Result<(Mesh, f64), Cancelled> {
     let form = &form.lowered();
     let mut resolution = 32.min(finest.max(4));
     let mut last_worst = f64::INFINITY;
     loop {
         let grid = Grid::around(&form.bounds(), resolution);
-        let cells = grid.cells_by_intervals(form, threads);
-        let mesh = contour(form, &grid, &cells, threads);
-        let (worst, most) = deviation(form, &mesh, grid.cell, threads);
+        let cells = grid.cells_by_intervals(form, control)?;
+        let mesh = contour(form, &grid, &cells, control)?;
+        let (worst, most) = deviation(form, &mesh, grid.cell, control)?;
         // On smooth parts the error falls to a quarter with each halving of the cells; where creases meet, only
         // to a half. For a last hundredth of the surface that is not worth it: the bound says what was reached.
         let at_creases = most * 1.5 <= tolerance && worst > 0.35 * last_worst;
         if worst * 1.5 <= tolerance || at_creases || resolution * 2 > finest {
-            return (mesh, worst * 1.5);
+            return Ok((mesh, worst * 1.5));
         }
         last_worst = worst;
         resolution *= 2;
@@ -93,7 +98,12 @@ pub(super) fn of_form(form: &FreeForm, tolerance: f64, finest: u32, threads: &dy
 
 /// Tells how large a mesh [`of_form`] would make, and its bound. A surface cannot be counted without finding it: it is
 /// found on coarse grids, and goes on from there as it went so far.
-pub(super) fn forecast(form: &FreeForm, tolerance: f64, finest: u32) -> (MeshSize, f64) {
+pub(super) fn forecast(
+    form: &FreeForm,
+    tolerance: f64,
+    finest: u32,
+    control: &Control<'_>,
+) -> Result<(MeshSize, f64), Cancelled> {
     /// Finest grid on which it is found.
     const FOUND: u32 = 64;
     let form = &form.lowered();
@@ -101,12 +111,12 @@ pub(super) fn forecast(form: &FreeForm, tolerance: f64, finest: u32) -> (MeshSiz
     let mut last: Option<(f64, Mesh)> = None;
     loop {
         let grid = Grid::around(&form.bounds(), resolution);
-        let mesh = contour(form, &grid, &grid.cells_by_intervals(form, &OneThread), &OneThread);
-        let (worst, most) = deviation(form, &mesh, grid.cell, &OneThread);
+        let mesh = contour(form, &grid, &grid.cells_by_intervals(form, control)?, control)?;
+        let (worst, most) = deviation(form, &mesh, grid.cell, control)?;
         let before = last.as_ref().map_or(f64::INFINITY, |(worst, _)| *worst);
         let at_creases = most * 1.5 <= tolerance && worst > 0.35 * before;
         if worst * 1.5 <= tolerance || at_creases || resolution * 2 > finest {
-            return (size_of_contour(&mesh, 1.0), worst * 1.5);
+            return Ok((size_of_contour(&mesh, 1.0), worst * 1.5));
         }
         if resolution >= FOUND {
             // Four times as many cells, and errors that fall as they fell, for each further halving.
@@ -119,7 +129,7 @@ pub(super) fn forecast(form: &FreeForm, tolerance: f64, finest: u32) -> (MeshSiz
                     break;
                 }
             }
-            return (size_of_contour(&mesh, times), bound);
+            return Ok((size_of_contour(&mesh, times), bound));
         }
         last = Some((worst, mesh));
         resolution *= 2;
@@ -134,7 +144,7 @@ fn size_of_contour(mesh: &Mesh, times: f64) -> MeshSize {
 /// Tells how large a mesh [`of_volume`] would make: two triangles for each edge between a sample inside and one outside,
 /// and for each cell that the surface crosses a vertex with a color, or several at a crease. How many is found out in
 /// some layers of cells.
-pub(super) fn forecast_of_volume(volume: &Volume) -> MeshSize {
+pub(super) fn forecast_of_volume(volume: &Volume, control: &Control<'_>) -> Result<MeshSize, Cancelled> {
     let level = volume.transfer.surface_value();
     let [nx, ny, nz] = volume.size().map(|s| s as usize);
     let is_inside = |i: usize| volume.samples().get(i) >= level;
@@ -151,13 +161,13 @@ pub(super) fn forecast_of_volume(volume: &Volume) -> MeshSize {
             }
         }
     }
-    let cells = surface_cells(volume);
-    let vertices = cells.len() as f64 * vertices_a_cell(volume, &cells);
-    MeshSize { vertices, triangles: edges as f64 * 2.0, each: [36.0, 12.0], is_exact: false }
+    let cells = surface_cells(volume, control)?;
+    let vertices = cells.len() as f64 * vertices_a_cell(volume, &cells, control)?;
+    Ok(MeshSize { vertices, triangles: edges as f64 * 2.0, each: [36.0, 12.0], is_exact: false })
 }
 
 /// Finds the surface in some layers of cells, and counts the vertices of a cell.
-fn vertices_a_cell(volume: &Volume, cells: &[[u32; 3]]) -> f64 {
+fn vertices_a_cell(volume: &Volume, cells: &[[u32; 3]], control: &Control<'_>) -> Result<f64, Cancelled> {
     /// Layers that lie together; the outer ones only serve those between.
     const LAYERS: u32 = 6;
     /// Cells in which the surface is found.
@@ -168,18 +178,18 @@ fn vertices_a_cell(volume: &Volume, cells: &[[u32; 3]]) -> f64 {
     let few: Vec<[u32; 3]> = cells.iter().copied().filter(|c| c[2] / LAYERS % every == first).collect();
     let is_inner = |layer: u32| every == 1 || (1..LAYERS - 1).contains(&(layer % LAYERS));
     let (surface, grid) = (VolumeSurface::of(volume), Grid::of(volume));
-    let mesh = contour(&surface, &grid, &few, &OneThread);
+    let mesh = contour(&surface, &grid, &few, control)?;
     let layer_of = |p: &Vec3| ((f64::from(p.z) - grid.first.z) / grid.step.z) as u32;
     let vertices = mesh.positions.iter().filter(|p| is_inner(layer_of(p))).count();
     let inner = few.iter().filter(|c| is_inner(c[2])).count();
-    if inner == 0 { 1.0 } else { vertices as f64 / inner as f64 }
+    Ok(if inner == 0 { 1.0 } else { vertices as f64 / inner as f64 })
 }
 
 /// Triangulates the surface of a volume at the resolution of its samples; the bound is a cell's diagonal.
-pub(super) fn of_volume(volume: &Volume, threads: &dyn Threads) -> (Mesh, f64) {
+pub(super) fn of_volume(volume: &Volume, control: &Control<'_>) -> Result<(Mesh, f64), Cancelled> {
     let (surface, grid) = (VolumeSurface::of(volume), Grid::of(volume));
-    let cells = surface_cells(volume);
-    let mut mesh = contour(&surface, &grid, &cells, threads);
+    let cells = surface_cells(volume, control)?;
+    let mut mesh = contour(&surface, &grid, &cells, control)?;
     mesh.colors = mesh
         .positions
         .iter()
@@ -189,12 +199,12 @@ pub(super) fn of_volume(volume: &Volume, threads: &dyn Threads) -> (Mesh, f64) {
             volume.transfer.at(value.max(volume.transfer.surface_value())).0
         })
         .collect();
-    (mesh, volume.spacing().length())
+    Ok((mesh, volume.spacing().length()))
 }
 
 /// Lists the cells between samples whose corners lie on both sides of the surface; the grid is one sample
 /// larger on each side, where the field counts as empty.
-fn surface_cells(volume: &Volume) -> Vec<[u32; 3]> {
+fn surface_cells(volume: &Volume, control: &Control<'_>) -> Result<Vec<[u32; 3]>, Cancelled> {
     let level = volume.transfer.surface_value();
     let [nx, ny, nz] = volume.size().map(|s| s as usize);
     // A sample on the level itself may come out on either side when it is interpolated: it counts as both.
@@ -211,6 +221,7 @@ fn surface_cells(volume: &Volume) -> Vec<[u32; 3]> {
     let mut cells = Vec::new();
     for z in 0..=nz {
         for y in 0..=ny {
+            control.check()?;
             for x in 0..=nx {
                 let corners = (0..8).map(|c| at(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)));
                 let (inside, outside) =
@@ -221,9 +232,11 @@ fn surface_cells(volume: &Volume) -> Vec<[u32; 3]> {
             }
         }
     }
-    cells
+    Ok(cells)
 }
 
+/// Cells or triangles for one worker at a time: less than a millisecond's work where a form has few parts.
+const PIECE: usize = 128;
 /// Cells along the edge of what one thread looks through.
 const BLOCK: u32 = 32;
 
@@ -266,22 +279,29 @@ impl Grid {
     }
 
     /// Lists the cells in which the form may vanish.
-    fn cells_by_intervals(&self, form: &FreeForm, threads: &dyn Threads) -> Vec<[u32; 3]> {
+    fn cells_by_intervals(&self, form: &FreeForm, control: &Control<'_>) -> Result<Vec<[u32; 3]>, Cancelled> {
         let count = self.size.map(|edge| edge.div_ceil(BLOCK) as usize);
         let mut blocks = vec![Vec::new(); count.iter().product()];
-        for_each_mut(threads, &mut blocks, 1, &|i, cells| {
+        control.for_each_mut(&mut blocks, 1, &|i, cells| {
             let block = [i % count[0], i / count[0] % count[1], i / (count[0] * count[1])];
             let from = block.map(|b| b as u32 * BLOCK);
             let to = std::array::from_fn(|a| (from[a] + BLOCK).min(self.size[a]));
-            self.subdivide(form, from, to, cells);
-        });
+            self.subdivide(form, from, to, cells, control);
+        })?;
         let mut cells = blocks.concat();
         cells.sort_unstable_by_key(|&c| self.index(c));
-        cells
+        Ok(cells)
     }
 
-    fn subdivide(&self, form: &FreeForm, from: [u32; 3], to: [u32; 3], cells: &mut Vec<[u32; 3]>) {
-        if (0..3).any(|a| from[a] >= to[a]) {
+    fn subdivide(
+        &self,
+        form: &FreeForm,
+        from: [u32; 3],
+        to: [u32; 3],
+        cells: &mut Vec<[u32; 3]>,
+        control: &Control<'_>,
+    ) {
+        if control.is_cancelled() || (0..3).any(|a| from[a] >= to[a]) {
             return;
         }
         let range = form.form().interval(&Aabb::new(self.corner(from), self.corner(to)));
@@ -297,8 +317,8 @@ impl Grid {
         let (mut left_to, mut right_from) = (to, from);
         left_to[longest] = middle;
         right_from[longest] = middle;
-        self.subdivide(form, from, left_to, cells);
-        self.subdivide(form, right_from, to, cells);
+        self.subdivide(form, from, left_to, cells, control);
+        self.subdivide(form, right_from, to, cells, control);
     }
 }
 
@@ -314,13 +334,21 @@ struct CellSurface {
 const EDGES: [(usize, usize); 12] =
     [(0, 1), (2, 3), (4, 5), (6, 7), (0, 2), (1, 3), (4, 6), (5, 7), (0, 4), (1, 5), (2, 6), (3, 7)];
 
-fn contour(field: &impl Field, grid: &Grid, cells: &[[u32; 3]], threads: &dyn Threads) -> Mesh {
+fn contour(
+    field: &impl Field,
+    grid: &Grid,
+    cells: &[[u32; 3]],
+    control: &Control<'_>,
+) -> Result<Mesh, Cancelled> {
     let mut surfaces = vec![CellSurface::default(); cells.len()];
-    for_each_mut(threads, &mut surfaces, 512, &|i, surface| *surface = cell_surface(field, grid, cells[i]));
+    control.for_each_mut(&mut surfaces, PIECE, &|i, surface| {
+        *surface = cell_surface(field, grid, cells[i]);
+    })?;
 
     let mut positions = Vec::new();
     let mut vertex_of: HashMap<u64, u32> = HashMap::new();
     for (cell, surface) in cells.iter().zip(&surfaces) {
+        control.check()?;
         if let Some(vertex) = surface.vertex {
             vertex_of.insert(grid.index(*cell), positions.len() as u32);
             positions.push(vertex);
@@ -328,6 +356,7 @@ fn contour(field: &impl Field, grid: &Grid, cells: &[[u32; 3]], threads: &dyn Th
     }
     let mut quads = Vec::new();
     for (cell, surface) in cells.iter().zip(&surfaces) {
+        control.check()?;
         for axis in 0..3 {
             if surface.crossing[axis] != 0
                 && let Some(quad) = quad_around_edge(grid, &vertex_of, *cell, axis, surface.crossing[axis])
@@ -336,11 +365,11 @@ fn contour(field: &impl Field, grid: &Grid, cells: &[[u32; 3]], threads: &dyn Th
             }
         }
     }
-    for_each_mut(threads, &mut quads, 512, &|_, (quad, halves)| {
+    control.for_each_mut(&mut quads, PIECE, &|_, (quad, halves)| {
         *halves = split_quad(*quad, &positions, field);
-    });
+    })?;
     let triangles: Vec<[u32; 3]> = quads.into_iter().flat_map(|(_, halves)| halves).collect();
-    with_normals(field, &positions, &triangles, threads)
+    with_normals(field, &positions, &triangles, control)
 }
 
 fn cell_surface(field: &impl Field, grid: &Grid, cell: [u32; 3]) -> CellSurface {
@@ -449,10 +478,10 @@ fn with_normals(
     field: &impl Field,
     positions: &[DVec3],
     triangles: &[[u32; 3]],
-    threads: &dyn Threads,
-) -> Mesh {
+    control: &Control<'_>,
+) -> Result<Mesh, Cancelled> {
     let mut normals: Vec<Option<[Vec3; 3]>> = vec![None; triangles.len()];
-    for_each_mut(threads, &mut normals, 512, &|t, normals| {
+    control.for_each_mut(&mut normals, PIECE, &|t, normals| {
         let [a, b, c] = triangles[t].map(|i| positions[i as usize]);
         let flat = (b - a).cross(c - a);
         let middle = (a + b + c) / 3.0;
@@ -461,10 +490,11 @@ fn with_normals(
             if normal.dot(flat) > 0.0 { normal } else { flat.normalize_or(DVec3::Y) }.as_vec3()
         };
         *normals = (flat.length_squared() != 0.0).then(|| [a, b, c].map(normal_at));
-    });
+    })?;
     let mut mesh = Mesh::default();
     let mut variants: Vec<Vec<u32>> = vec![Vec::new(); positions.len()];
     for (triangle, normals) in triangles.iter().zip(normals) {
+        control.check()?;
         let Some(normals) = normals else { continue };
         let corners = std::array::from_fn(|k| {
             let (i, normal) = (triangle[k] as usize, normals[k]);
@@ -479,14 +509,19 @@ fn with_normals(
         });
         mesh.triangles.push(corners);
     }
-    mesh
+    Ok(mesh)
 }
 
 /// Returns the greatest distance of the middles of edges and faces from the surface, to first order, and the one
 /// below which 99 of 100 lie.
-fn deviation(field: &impl Field, mesh: &Mesh, cell: f64, threads: &dyn Threads) -> (f64, f64) {
+fn deviation(
+    field: &impl Field,
+    mesh: &Mesh,
+    cell: f64,
+    control: &Control<'_>,
+) -> Result<(f64, f64), Cancelled> {
     let mut by_triangle = vec![[0.0_f64; 5]; mesh.triangles.len()];
-    for_each_mut(threads, &mut by_triangle, 512, &|t, distances| {
+    control.for_each_mut(&mut by_triangle, PIECE, &|t, distances| {
         let [a, b, c] = mesh.corners(t).map(glam::Vec3::as_dvec3);
         let places = [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0, a];
         *distances = places.map(|p| {
@@ -495,20 +530,19 @@ fn deviation(field: &impl Field, mesh: &Mesh, cell: f64, threads: &dyn Threads) 
             let distance = if slope > 0.0 { value.abs() / slope } else { cell };
             distance.min(cell * 2.0)
         });
-    });
+    })?;
     let distances = by_triangle.as_flattened_mut();
     if distances.is_empty() {
-        return (cell, cell);
+        return Ok((cell, cell));
     }
     let worst = distances.iter().copied().fold(0.0, f64::max);
     let at = distances.len() * 99 / 100;
-    (worst, *distances.select_nth_unstable_by(at, f64::total_cmp).1)
+    Ok((worst, *distances.select_nth_unstable_by(at, f64::total_cmp).1))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parallel::OneThread;
     use crate::scene::{Form, Primitive, Samples};
 
     /// Counts edges that do not belong to two triangles, vertices welded by position.
@@ -531,7 +565,7 @@ mod tests {
             FreeForm::new(Form::Ellipsoid { center: DVec3::new(0.1, 0.2, 0.3), radii: DVec3::ONE }).unwrap();
         let torus = FreeForm::new(Form::Torus { major: 0.7, minor: 0.3 }).unwrap();
         for (form, volume) in [(sphere, 4.0 / 3.0 * PI), (torus, 2.0 * PI * PI * 0.7 * 0.09)] {
-            let (mesh, bound) = of_form(&form, 2e-3, 256, &OneThread);
+            let (mesh, bound) = of_form(&form, 2e-3, 256, &Control::simple()).unwrap();
             assert!(bound <= 2e-3, "{bound}");
             assert_eq!(open_edges(&mesh), 0);
             assert!((mesh.volume() - volume).abs() < mesh.area() * bound, "{} for {volume}", mesh.volume());
@@ -541,7 +575,7 @@ mod tests {
     #[test]
     fn creases_of_a_box_stay_sharp() {
         let form = FreeForm::from_primitive(&Primitive::Box { size: DVec3::new(1.0, 0.7, 1.3) }).unwrap();
-        let (mesh, _) = of_form(&form, 1e-3, 32, &OneThread);
+        let (mesh, _) = of_form(&form, 1e-3, 32, &Control::simple()).unwrap();
         assert!((mesh.volume() - 0.91).abs() < 2e-3, "{}", mesh.volume());
         assert!((mesh.area() - 2.0 * (0.7 + 1.3 + 0.91)).abs() < 1e-2, "{}", mesh.area());
         let slanted = mesh.normals.iter().filter(|n| n.abs().max_element() < 0.999).count();
@@ -569,7 +603,7 @@ mod tests {
             crate::scene::TransferPoint { value: -0.5, color: glam::Vec3::ONE, opacity: 0.0 },
             crate::scene::TransferPoint { value: 0.5, color: glam::Vec3::ONE, opacity: 1.0 },
         ];
-        let (mesh, bound) = of_volume(&volume, &OneThread);
+        let (mesh, bound) = of_volume(&volume, &Control::simple()).unwrap();
         assert_eq!(open_edges(&mesh), 0);
         let worst = mesh.positions.iter().map(|p| (p.as_dvec3().length() - 8.0).abs()).fold(0.0, f64::max);
         assert!(worst < 0.1 && worst < bound, "{worst}");

@@ -2,18 +2,24 @@
 
 use super::MeshSize;
 use crate::scene::{HeightField, Mesh};
+use crate::seam::{Cancelled, Control};
 use glam::{Vec2, Vec3};
 
 /// Triangulates every `n`-th sample, `n` the largest power of two that keeps the tolerance; returns the bound.
 ///
 /// With `n = 1` the greatest distance between a bilinear patch and its two triangles is a quarter of its
 /// twist `|h00 - h10 - h01 + h11|`, along y.
-pub(super) fn triangulate(field: &HeightField, tolerance: f64) -> (Mesh, f64) {
-    let (stride, bound) = choose_stride(field, tolerance);
+pub(super) fn triangulate(
+    field: &HeightField,
+    tolerance: f64,
+    control: &Control<'_>,
+) -> Result<(Mesh, f64), Cancelled> {
+    let (stride, bound) = choose_stride(field, tolerance, control)?;
     let columns = kept(field.columns(), stride);
     let rows = kept(field.rows(), stride);
     let mut mesh = Mesh::default();
     for &row in &rows {
+        control.check()?;
         for &column in &columns {
             let p = field.vertex(column, row);
             mesh.positions.push(p.as_vec3());
@@ -30,28 +36,36 @@ pub(super) fn triangulate(field: &HeightField, tolerance: f64) -> (Mesh, f64) {
             mesh.triangles.push([b, c, d]);
         }
     }
-    (mesh, bound)
+    Ok((mesh, bound))
 }
 
 /// Tells how large a mesh [`triangulate`] would make, and its bound.
-pub(super) fn forecast(field: &HeightField, tolerance: f64) -> (MeshSize, f64) {
-    let (stride, bound) = choose_stride(field, tolerance);
+pub(super) fn forecast(
+    field: &HeightField,
+    tolerance: f64,
+    control: &Control<'_>,
+) -> Result<(MeshSize, f64), Cancelled> {
+    let (stride, bound) = choose_stride(field, tolerance, control)?;
     let [columns, rows] = [field.columns(), field.rows()].map(|samples| kept(samples, stride).len() as u32);
-    (MeshSize::exact(columns * rows, (columns - 1) * (rows - 1) * 2), bound)
+    Ok((MeshSize::exact(columns * rows, (columns - 1) * (rows - 1) * 2), bound))
 }
 
-fn choose_stride(field: &HeightField, tolerance: f64) -> (u32, f64) {
-    let mut best = (1, deviation(field, 1));
+fn choose_stride(
+    field: &HeightField,
+    tolerance: f64,
+    control: &Control<'_>,
+) -> Result<(u32, f64), Cancelled> {
+    let mut best = (1, deviation(field, 1, control)?);
     let mut stride = 2;
     while stride < field.columns().min(field.rows()) {
-        let bound = deviation(field, stride);
+        let bound = deviation(field, stride, control)?;
         if bound > tolerance {
             break;
         }
         best = (stride, bound);
         stride *= 2;
     }
-    best
+    Ok(best)
 }
 
 /// Lists the samples that are kept: every `stride`-th and the last.
@@ -62,10 +76,11 @@ fn kept(samples: u32, stride: u32) -> Vec<u32> {
 }
 
 /// Returns the greatest height difference between the field and its triangles.
-fn deviation(field: &HeightField, stride: u32) -> f64 {
+fn deviation(field: &HeightField, stride: u32, control: &Control<'_>) -> Result<f64, Cancelled> {
     let (columns, rows) = (kept(field.columns(), stride), kept(field.rows(), stride));
     let mut worst = 0.0_f64;
     for z in rows.windows(2) {
+        control.check()?;
         for x in columns.windows(2) {
             let [h00, h10] = [field.height(x[0], z[0]), field.height(x[1], z[0])];
             let [h01, h11] = [field.height(x[0], z[1]), field.height(x[1], z[1])];
@@ -92,7 +107,7 @@ fn deviation(field: &HeightField, stride: u32) -> f64 {
             (h00 - h10 - h01 + h11).abs() * 0.25
         })
         .fold(0.0, f64::max);
-    worst + twist
+    Ok(worst + twist)
 }
 
 /// Returns the mean slope of the cells around a sample as a normal.
@@ -121,9 +136,9 @@ mod tests {
     fn deviations_stay_under_the_bound() {
         let field = waves();
         for tolerance in [0.0, 0.004, 0.05] {
-            let (mesh, bound) = triangulate(&field, tolerance);
+            let (mesh, bound) = triangulate(&field, tolerance, &Control::simple()).unwrap();
             mesh.check().unwrap();
-            assert!(bound <= tolerance.max(deviation(&field, 1)));
+            assert!(bound <= tolerance.max(deviation(&field, 1, &Control::simple()).unwrap()));
             for t in 0..mesh.triangles.len() {
                 let [a, b, c] = mesh.corners(t).map(glam::Vec3::as_dvec3);
                 for p in [(a + b) * 0.5, (b + c) * 0.5, (a + c) * 0.5, (a + b + c) / 3.0] {
@@ -133,6 +148,7 @@ mod tests {
                 assert!((b - a).cross(c - a).y > 0.0, "faces look up");
             }
         }
-        assert!(triangulate(&field, 0.05).0.triangles.len() * 3 < triangulate(&field, 0.0).0.triangles.len());
+        let count = |tolerance| triangulate(&field, tolerance, &Control::simple()).unwrap().0.triangles.len();
+        assert!(count(0.05) * 3 < count(0.0));
     }
 }

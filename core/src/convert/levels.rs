@@ -7,8 +7,8 @@
 //!
 //! Corners at borders, at seams of normals, texture coordinates and materials, and where more than one sheet meets stay.
 
-use crate::parallel::{Threads, for_each_mut};
 use crate::scene::Mesh;
+use crate::seam::{Cancelled, Control};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -22,22 +22,27 @@ const SAME_UV: f32 = 1.0 / 64.0;
 const MOST_NEIGHBORS: usize = 16;
 /// Most rounds; each takes out corners that have nothing to do with one another.
 const ROUNDS: u32 = 40;
-/// Corners looked at by one worker at a time.
-const PIECE: usize = 512;
+/// Corners looked at by one worker at a time: less than a millisecond's work.
+const PIECE: usize = 128;
 
 /// Returns fewer triangles, where that are many fewer, and how far the farthest given corner is from them, in units of the mesh.
-pub(super) fn simplified(mesh: &Mesh, tolerance: f64, threads: &dyn Threads) -> (Mesh, f64) {
-    let mut state = State::of(mesh);
+pub(super) fn simplified(
+    mesh: &Mesh,
+    tolerance: f64,
+    control: &Control<'_>,
+) -> Result<(Mesh, f64), Cancelled> {
+    let mut state = State::of(mesh, control)?;
     for round in 0..ROUNDS {
         // What is flattest goes first.
         let limit = tolerance * (f64::from(round + 1) / 4.0).min(1.0);
-        let gone = state.round(limit, tolerance, threads);
+        let gone = state.round(limit, tolerance, control)?;
         if round >= 4 && gone * 100 < state.triangles.len() {
             break;
         }
     }
     // To save a few is not worth a surface that is only almost the given one.
-    if state.triangles.len() * 4 > mesh.triangles.len() * 3 { (mesh.clone(), 0.0) } else { state.finish() }
+    let is_worth = state.triangles.len() * 4 <= mesh.triangles.len() * 3;
+    Ok(if is_worth { state.finish() } else { (mesh.clone(), 0.0) })
 }
 
 /// A triangle that is left.
@@ -77,11 +82,12 @@ struct State<'a> {
 }
 
 impl<'a> State<'a> {
-    fn of(mesh: &'a Mesh) -> Self {
+    fn of(mesh: &'a Mesh, control: &Control<'_>) -> Result<Self, Cancelled> {
         let count = mesh.positions.len();
         let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(count);
         let mut stays = vec![false; count];
         for (i, p) in mesh.positions.iter().enumerate() {
+            control.check()?;
             // Adding 0 makes one number of 0 and -0.
             let place = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
             if let Some(other) = known.insert(place, i as u32) {
@@ -96,7 +102,7 @@ impl<'a> State<'a> {
             off: 0.0,
             lost: NONE,
         };
-        Self {
+        Ok(Self {
             mesh,
             stays,
             triangles: mesh.triangles.iter().enumerate().map(triangle).collect(),
@@ -105,7 +111,7 @@ impl<'a> State<'a> {
             is_stale: vec![true; count],
             first: Vec::new(),
             of_corner: Vec::new(),
-        }
+        })
     }
 
     /// Lists the triangles of each corner.
@@ -134,14 +140,14 @@ impl<'a> State<'a> {
     }
 
     /// Takes out corners that change the surface by less than a limit. Returns how many.
-    fn round(&mut self, limit: f64, tolerance: f64, threads: &dyn Threads) -> usize {
+    fn round(&mut self, limit: f64, tolerance: f64, control: &Control<'_>) -> Result<usize, Cancelled> {
         self.link();
         let mut moves = std::mem::take(&mut self.moves);
-        for_each_mut(threads, &mut moves, PIECE, &|corner, chosen| {
+        control.for_each_mut(&mut moves, PIECE, &|corner, chosen| {
             if self.is_stale[corner] && !self.stays[corner] {
                 *chosen = self.best_move(corner as u32, tolerance);
             }
-        });
+        })?;
         self.is_stale.fill(false);
         let mut order: Vec<(f64, u32)> = moves
             .iter()
@@ -154,6 +160,7 @@ impl<'a> State<'a> {
         let (mut touched, mut gone) = (vec![false; self.stays.len()], vec![false; self.triangles.len()]);
         let (mut count, mut added) = (0, Vec::new());
         for (_, corner) in order {
+            control.check()?;
             let Some(chosen) = self.moves[corner as usize] else { continue };
             let is_free = |t: &u32| !self.triangles[*t as usize].corners.iter().any(|&c| touched[c as usize]);
             if !self.around(corner).iter().all(is_free) {
@@ -177,7 +184,7 @@ impl<'a> State<'a> {
         let mut each = gone.iter();
         self.triangles.retain(|_| each.next().is_some_and(|gone| !gone));
         self.triangles.append(&mut added);
-        count
+        Ok(count)
     }
 
     /// Finds the neighbor onto which a corner is best moved.
@@ -412,7 +419,6 @@ impl Star {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parallel::OneThread;
 
     /// A ball of rings and columns whose last column has the first one's corners.
     fn ball(rings: u32) -> Mesh {
@@ -466,7 +472,7 @@ mod tests {
     fn fewer_triangles_stay_within_what_is_told() {
         let mesh = ball(60);
         for (tolerance, most) in [(0.002, 9500), (0.004, 3500), (0.02, 1500)] {
-            let (fewer, bound) = simplified(&mesh, tolerance, &OneThread);
+            let (fewer, bound) = simplified(&mesh, tolerance, &Control::simple()).unwrap();
             fewer.check().unwrap();
             assert!(bound <= tolerance && bound > 0.0, "{bound}");
             // Slivers at the poles stay.
@@ -493,12 +499,12 @@ mod tests {
         for i in (0..20 * 21).filter(|i| i % 21 < 20) {
             mesh.triangles.extend([[i, i + 1, i + 21], [i + 1, i + 22, i + 21]]);
         }
-        let (fewer, bound) = simplified(&mesh, 1e-6, &OneThread);
+        let (fewer, bound) = simplified(&mesh, 1e-6, &Control::simple()).unwrap();
         assert!(bound < 1e-12 && fewer.triangles.len() < 200, "{bound} {}", fewer.triangles.len());
         assert!((fewer.area() - 400.0).abs() < 1e-9 && fewer.uvs.len() == fewer.positions.len());
         // Where two materials meet, all corners stay.
         mesh.slots = (0..mesh.triangles.len()).map(|t| u16::from(t >= mesh.triangles.len() / 2)).collect();
-        let (two, _) = simplified(&mesh, 1e-6, &OneThread);
+        let (two, _) = simplified(&mesh, 1e-6, &Control::simple()).unwrap();
         let area = |slot: u16| {
             let own = (0..two.triangles.len()).filter(|&t| two.slots[t] == slot);
             Mesh { triangles: own.map(|t| two.triangles[t]).collect(), slots: vec![], ..two.clone() }.area()
@@ -513,7 +519,7 @@ mod tests {
             triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
             ..Mesh::default()
         };
-        let (same, bound) = simplified(&tetrahedron, 10.0, &OneThread);
+        let (same, bound) = simplified(&tetrahedron, 10.0, &Control::simple()).unwrap();
         assert_eq!((same.triangles.len(), bound), (4, 0.0));
         let broken = Mesh {
             positions: vec![Vec3::NAN, Vec3::X, Vec3::Y, Vec3::splat(f32::INFINITY), Vec3::Z],
@@ -522,15 +528,20 @@ mod tests {
             ..Mesh::default()
         };
         for tolerance in [0.0, 1.0, f64::INFINITY, f64::NAN] {
-            assert_eq!(simplified(&broken, tolerance, &OneThread).0.triangles.len(), 6, "{tolerance}");
+            assert_eq!(
+                simplified(&broken, tolerance, &Control::simple()).unwrap().0.triangles.len(),
+                6,
+                "{tolerance}"
+            );
         }
-        assert_eq!(simplified(&Mesh::default(), 1.0, &OneThread).0.triangles.len(), 0);
+        assert_eq!(simplified(&Mesh::default(), 1.0, &Control::simple()).unwrap().0.triangles.len(), 0);
     }
 
     #[test]
     fn the_number_of_threads_changes_nothing() {
         let (mesh, pool) = (ball(40), crate::parallel::Pool::new(3).unwrap());
-        let [one, three] = [&OneThread as &dyn Threads, &pool].map(|t| simplified(&mesh, 0.01, t).0);
+        let [one, three] = [Control::simple(), Control::new(&pool)]
+            .map(|control| simplified(&mesh, 0.01, &control).unwrap().0);
         assert!(one.positions == three.positions && one.triangles == three.triangles);
     }
 }

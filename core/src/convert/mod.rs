@@ -3,9 +3,11 @@
 //!
 //! Nothing is converted that no one asked for. Tolerances are grouped in classes half an octave wide, as shares of
 //! the body's size, so that a scene in other units becomes the same picture; a result is kept under (shape, class)
-//! as long as the shape lives, and shared by all who ask again.
+//! as long as the shape lives, and shared by all who ask again. A conversion that the host stops leaves nothing behind.
 
 mod cache;
+#[cfg(test)]
+mod cancelling;
 mod chunks;
 mod distance;
 mod field_mesh;
@@ -16,8 +18,8 @@ mod primitive_mesh;
 mod voxel_mesh;
 mod voxelize;
 
-use crate::parallel::Threads;
 use crate::scene::{Material, Mesh, Object, Scene, Shape, Voxels};
+use crate::seam::{Cancelled, Control};
 use cache::Cache;
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
@@ -134,12 +136,42 @@ impl DistanceModel {
 
 /// Why a shape could not be converted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{object}: {reason}")]
-pub struct ConvertError {
-    /// The object's name.
-    pub object: String,
-    /// What is in the way.
-    pub reason: String,
+#[non_exhaustive]
+pub enum ConvertError {
+    /// The host asked to stop. Nothing is kept of what was begun.
+    #[error("cancelled")]
+    Cancelled,
+    /// There is nothing to convert, or nothing comes of it.
+    #[error("{object}: {reason}")]
+    Impossible {
+        /// The object's name.
+        object: String,
+        /// What is in the way.
+        reason: String,
+    },
+}
+
+impl ConvertError {
+    fn of(object: &Object, reason: impl Into<String>) -> Self {
+        Self::Impossible { object: object.name.clone(), reason: reason.into() }
+    }
+
+    /// Returns what is in the way of the shape itself.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when nothing is but the host.
+    pub fn reason(self) -> Result<String, Cancelled> {
+        match self {
+            Self::Cancelled => Err(Cancelled),
+            Self::Impossible { reason, .. } => Ok(reason),
+        }
+    }
+}
+
+impl From<Cancelled> for ConvertError {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
 }
 
 /// How fine a conversion shall be.
@@ -209,16 +241,16 @@ impl Converter {
     /// Returns the shape of an object as triangles. Meshes are returned as they are.
     ///
     /// # Errors
-    /// When the shape has no surface at all.
+    /// When the shape has no surface at all, or the host cancelled.
     pub fn mesh(
         &self,
         scene: &Scene,
         object: &Object,
         detail: Detail,
-        threads: &dyn Threads,
+        control: &Control<'_>,
     ) -> Result<Arc<MeshModel>, ConvertError> {
         let scale = scale_of(object);
-        self.meshes.get(scene, object, detail, |tolerance| {
+        self.meshes.get(scene, object, detail, control, |tolerance| {
             let (mesh, bound, why) = match &*object.shape {
                 Shape::Mesh(mesh) => (mesh.clone(), 0.0, "triangles as given".to_owned()),
                 Shape::Primitive(primitive) => {
@@ -228,23 +260,23 @@ impl Converter {
                 }
                 Shape::Voxels(voxels) => {
                     let clear = clear_values(scene, object);
-                    let mesh = voxel_mesh::exposed_faces(voxels, &clear);
+                    let mesh = voxel_mesh::exposed_faces(voxels, &clear, control)?;
                     let why = format!("{} exposed faces", mesh.triangles.len() / 2);
                     (mesh, 0.0, why)
                 }
                 Shape::FreeForm(form) => {
                     let resolution = detail.max_resolution.min(field_mesh::FINEST);
-                    let (mesh, bound) = field_mesh::of_form(form, tolerance, resolution, threads);
+                    let (mesh, bound) = field_mesh::of_form(form, tolerance, resolution, control)?;
                     let why = format!("{} triangles by dual contouring", mesh.triangles.len());
                     (mesh, bound, why)
                 }
                 Shape::HeightField(field) => {
-                    let (mesh, bound) = height_mesh::triangulate(field, tolerance);
+                    let (mesh, bound) = height_mesh::triangulate(field, tolerance, control)?;
                     let why = format!("{} triangles", mesh.triangles.len());
                     (mesh, bound, why)
                 }
                 Shape::Volume(volume) => {
-                    let (mesh, bound) = field_mesh::of_volume(volume, threads);
+                    let (mesh, bound) = field_mesh::of_volume(volume, control)?;
                     let why = format!(
                         "surface at value {:.4} as {} triangles; what is translucent is lost",
                         volume.transfer.surface_value(),
@@ -261,18 +293,18 @@ impl Converter {
     /// makes no more than are needed.
     ///
     /// # Errors
-    /// When the shape has no surface at all.
+    /// When the shape has no surface at all, or the host cancelled.
     pub fn level(
         &self,
         scene: &Scene,
         object: &Object,
         detail: Detail,
-        threads: &dyn Threads,
+        control: &Control<'_>,
     ) -> Result<Arc<MeshModel>, ConvertError> {
-        let Shape::Mesh(mesh) = &*object.shape else { return self.mesh(scene, object, detail, threads) };
+        let Shape::Mesh(mesh) = &*object.shape else { return self.mesh(scene, object, detail, control) };
         let scale = scale_of(object);
-        self.levels.get(scene, object, detail, |tolerance| {
-            let (fewer, bound) = levels::simplified(mesh, tolerance, threads);
+        self.levels.get(scene, object, detail, control, |tolerance| {
+            let (fewer, bound) = levels::simplified(mesh, tolerance, control)?;
             let why = format!("{} of {} triangles", fewer.triangles.len(), mesh.triangles.len());
             Ok(MeshModel { mesh: fewer, bound: bound * scale, why })
         })
@@ -281,34 +313,33 @@ impl Converter {
     /// Returns the shape of an object as voxels: bodies filled, meshes and height fields as their surface.
     ///
     /// # Errors
-    /// When the shape has no surface at all.
+    /// When the shape has no surface at all, or the host cancelled.
     pub fn voxels(
         &self,
         scene: &Scene,
         object: &Object,
         detail: Detail,
-        threads: &dyn Threads,
+        control: &Control<'_>,
     ) -> Result<Arc<VoxelModel>, ConvertError> {
-        self.voxels_filled(scene, object, detail, Filling::Natural, threads)
+        self.voxels_filled(scene, object, detail, Filling::Natural, control)
     }
 
     /// Returns the shape of an object as voxels of your choice. Grids are returned as they are.
     ///
     /// # Errors
-    /// When the shape has no surface at all.
+    /// When the shape has no surface at all, or the host cancelled.
     pub fn voxels_filled(
         &self,
         scene: &Scene,
         object: &Object,
         detail: Detail,
         filling: Filling,
-        threads: &dyn Threads,
+        control: &Control<'_>,
     ) -> Result<Arc<VoxelModel>, ConvertError> {
         let scale = scale_of(object);
-        self.voxels[filling as usize].get(scene, object, detail, |tolerance| {
+        self.voxels[filling as usize].get(scene, object, detail, control, |tolerance| {
             let resolution = detail.max_resolution;
-            let mut model = voxelize::voxelize(scene, object, tolerance, resolution, filling, threads)
-                .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
+            let mut model = voxelize::voxelize(scene, object, tolerance, resolution, filling, control)?;
             model.bound *= scale;
             note_normal_maps(&mut model.why, scene, object);
             Ok(model)
@@ -319,21 +350,20 @@ impl Converter {
     /// bounds add up.
     ///
     /// # Errors
-    /// When the shape has no surface at all.
+    /// When the shape has no surface at all, or the host cancelled.
     pub fn distance(
         &self,
         scene: &Scene,
         object: &Object,
         detail: Detail,
-        threads: &dyn Threads,
+        control: &Control<'_>,
     ) -> Result<Arc<DistanceModel>, ConvertError> {
         let scale = scale_of(object);
         let half = Detail { tolerance: detail.tolerance * 0.5, ..detail };
-        let surface = self.mesh(scene, object, half, threads)?;
-        self.distances.get(scene, object, detail, |tolerance| {
+        let surface = self.mesh(scene, object, half, control)?;
+        self.distances.get(scene, object, detail, control, |tolerance| {
             let mut model =
-                distance::of_mesh(scene, object, &surface.mesh, tolerance, detail.max_resolution, threads)
-                    .map_err(|reason| ConvertError { object: object.name.clone(), reason })?;
+                distance::of_mesh(scene, object, &surface.mesh, tolerance, detail.max_resolution, control)?;
             model.bound = model.bound * scale + surface.bound;
             note_normal_maps(&mut model.why, scene, object);
             Ok(model)
@@ -354,19 +384,8 @@ impl Converter {
             };
         }
         let scale = scale_of(object);
-        let tolerance = detail.in_object(object);
-        let (size, bound) = match &*object.shape {
-            Shape::Mesh(mesh) => {
-                let (vertices, triangles) = (mesh.positions.len() as f64, mesh.triangles.len() as f64);
-                (MeshSize { vertices, triangles, is_exact: true, ..MeshSize::default() }, 0.0)
-            }
-            Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
-            Shape::Voxels(voxels) => (voxel_mesh::forecast(voxels, &clear_values(scene, object)), 0.0),
-            Shape::FreeForm(form) => {
-                field_mesh::forecast(form, tolerance, detail.max_resolution.min(field_mesh::FINEST))
-            }
-            Shape::HeightField(field) => height_mesh::forecast(field, tolerance),
-            Shape::Volume(volume) => (field_mesh::forecast_of_volume(volume), volume.spacing().length()),
+        let Ok((size, bound)) = mesh_size(scene, object, detail, &Control::simple()) else {
+            unreachable!("nobody can stop it")
         };
         let bytes = size.vertices * size.each[0] + size.triangles * size.each[1];
         Forecast {
@@ -414,6 +433,31 @@ impl Converter {
     }
 }
 
+/// Tells how large a shape would be as triangles, and how far from it, in object space.
+fn mesh_size(
+    scene: &Scene,
+    object: &Object,
+    detail: Detail,
+    control: &Control<'_>,
+) -> Result<(MeshSize, f64), Cancelled> {
+    let tolerance = detail.in_object(object);
+    Ok(match &*object.shape {
+        Shape::Mesh(mesh) => {
+            let (vertices, triangles) = (mesh.positions.len() as f64, mesh.triangles.len() as f64);
+            (MeshSize { vertices, triangles, is_exact: true, ..MeshSize::default() }, 0.0)
+        }
+        Shape::Primitive(primitive) => primitive_mesh::forecast(primitive, tolerance),
+        Shape::Voxels(voxels) => (voxel_mesh::forecast(voxels, &clear_values(scene, object)), 0.0),
+        Shape::FreeForm(form) => {
+            field_mesh::forecast(form, tolerance, detail.max_resolution.min(field_mesh::FINEST), control)?
+        }
+        Shape::HeightField(field) => height_mesh::forecast(field, tolerance, control)?,
+        Shape::Volume(volume) => {
+            (field_mesh::forecast_of_volume(volume, control)?, volume.spacing().length())
+        }
+    })
+}
+
 /// Says that normal maps are lost, if there are any.
 fn note_normal_maps(why: &mut String, scene: &Scene, object: &Object) {
     if (0..object.materials.len()).any(|slot| scene.material(object, slot).normal_map.is_some()) {
@@ -449,7 +493,6 @@ fn clear_values(scene: &Scene, object: &Object) -> [bool; 256] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parallel::OneThread;
     use crate::scene::Primitive;
 
     fn ball() -> (Scene, Object) {
@@ -462,7 +505,9 @@ mod tests {
         let (scene, object) = ball();
         let converter = Converter::default();
         let get = |object: &Object, tolerance: f64| {
-            converter.mesh(&scene, object, Detail { tolerance, max_resolution: 64 }, &OneThread).unwrap()
+            converter
+                .mesh(&scene, object, Detail { tolerance, max_resolution: 64 }, &Control::simple())
+                .unwrap()
         };
         assert!(Arc::ptr_eq(&get(&object, 0.0101), &get(&object.clone(), 0.0105)));
         assert!(!Arc::ptr_eq(&get(&object, 0.01), &get(&object, 0.001)));
@@ -514,7 +559,7 @@ mod tests {
             for tolerance in [0.05, 0.004] {
                 let detail = Detail { tolerance, max_resolution: 256 };
                 let planned = Converter::default().mesh_forecast(&scene, &object, detail);
-                let made = Converter::default().mesh(&scene, &object, detail, &OneThread).unwrap();
+                let made = Converter::default().mesh(&scene, &object, detail, &Control::simple()).unwrap();
                 let off = planned.bytes as f64 / made.mesh.bytes() as f64 - 1.0;
                 assert!(off.abs() <= slack, "{:?} at {tolerance}: {off}", object.shape.kind());
             }
@@ -526,9 +571,9 @@ mod tests {
         let (scene, mut object) = ball();
         let converter = Converter::default();
         let detail = Detail { tolerance: 0.01, max_resolution: 64 };
-        let small = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+        let small = converter.mesh(&scene, &object, detail, &Control::simple()).unwrap();
         object.world_from_object = DAffine3::from_scale(DVec3::splat(100.0));
-        let large = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+        let large = converter.mesh(&scene, &object, detail, &Control::simple()).unwrap();
         assert!(large.bound <= 0.01, "{}", large.bound);
         assert!(large.mesh.triangles.len() > 20 * small.mesh.triangles.len());
     }
@@ -541,7 +586,7 @@ mod tests {
             let mut object = object.clone();
             object.world_from_object = DAffine3::from_scale(DVec3::splat(unit));
             let detail = Detail { tolerance: 0.0123 * unit, max_resolution: 64 };
-            let model = converter.mesh(&scene, &object, detail, &OneThread).unwrap();
+            let model = converter.mesh(&scene, &object, detail, &Control::simple()).unwrap();
             assert!(model.bound <= 0.0123 * unit);
             model.mesh.positions.clone()
         };
@@ -556,7 +601,7 @@ mod tests {
         let (scene, mut object) = ball();
         object.world_from_object = DAffine3::from_scale(DVec3::new(1.0, 0.0, 1.0));
         let error = Converter::default()
-            .mesh(&scene, &object, Detail { tolerance: 0.1, max_resolution: 8 }, &OneThread)
+            .mesh(&scene, &object, Detail { tolerance: 0.1, max_resolution: 8 }, &Control::simple())
             .unwrap_err();
         assert_eq!(error.to_string(), "ball: its transform squeezes it to nothing");
     }

@@ -2,6 +2,7 @@
 
 use super::MeshSize;
 use crate::scene::{Mesh, Voxels};
+use crate::seam::{Cancelled, Control};
 use glam::Vec3;
 use std::collections::HashMap;
 
@@ -9,10 +10,18 @@ use std::collections::HashMap;
 ///
 /// Faces are not merged: large rectangles would meet corners of small ones along their edges, and such
 /// T-junctions leave cracks in a rasterizer.
-pub(super) fn exposed_faces(voxels: &Voxels, clear: &[bool; 256]) -> Mesh {
+pub(super) fn exposed_faces(
+    voxels: &Voxels,
+    clear: &[bool; 256],
+    control: &Control<'_>,
+) -> Result<Mesh, Cancelled> {
     let mut mesh = Mesh::default();
     let mut vertices: HashMap<[u32; 3], u32> = HashMap::new();
     for_each_face(voxels, clear, |cell, axis, side, value| {
+        // To pass by the rest takes little time.
+        if control.is_cancelled() {
+            return;
+        }
         let corners = face_corners(cell, axis, side).map(|corner| {
             *vertices.entry(corner).or_insert_with(|| {
                 mesh.positions.push(Vec3::from_array(corner.map(|c| c as f32)));
@@ -23,7 +32,8 @@ pub(super) fn exposed_faces(voxels: &Voxels, clear: &[bool; 256]) -> Mesh {
         mesh.triangles.push([corners[0], corners[2], corners[3]]);
         mesh.slots.extend([u16::from(value) - 1; 2]);
     });
-    mesh
+    control.check()?;
+    Ok(mesh)
 }
 
 /// Tells how large a mesh [`exposed_faces`] would make: a closed surface of squares has as many corners as faces, and two
@@ -84,7 +94,7 @@ mod tests {
     #[test]
     fn two_cells_make_a_closed_box_of_ten_faces() {
         let voxels = Voxels::from_fn([2, 1, 1], |x, _, _| x as u8 + 1);
-        let mesh = exposed_faces(&voxels, &SOLID);
+        let mesh = exposed_faces(&voxels, &SOLID, &Control::simple()).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (20, 12));
         assert_eq!(forecast(&voxels, &SOLID).triangles as u64 / 2, 10);
         assert!((mesh.volume() - 2.0).abs() < 1e-12 && (mesh.area() - 10.0).abs() < 1e-12);

@@ -11,7 +11,7 @@ mod renderer;
 mod report;
 mod survey;
 
-pub use control::{Cancelled, Control, Watcher};
+pub use control::{Cancelled, Control, Probe, Watcher};
 pub use demand::{Demand, Surfaces, blocks_light, broken_triangles, detail, left_out, why_not_drawn};
 pub use info::BackendInfo;
 pub use need::{Frame, Need};

@@ -5,7 +5,7 @@ use super::info::BackendInfo;
 use super::need::{Frame, Need};
 use super::plan::{Decision, Plan};
 use super::report::Report;
-use crate::convert::Converter;
+use crate::convert::{ConvertError, Converter};
 use crate::framebuffer::Framebuffer;
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -81,5 +81,14 @@ pub enum RenderError {
 impl From<Cancelled> for RenderError {
     fn from(_: Cancelled) -> Self {
         Self::Cancelled
+    }
+}
+
+impl From<ConvertError> for RenderError {
+    fn from(error: ConvertError) -> Self {
+        match error {
+            ConvertError::Cancelled => Self::Cancelled,
+            other @ ConvertError::Impossible { .. } => Self::Failed(other.to_string()),
+        }
     }
 }

@@ -66,13 +66,12 @@ pub(crate) fn hand_over(
             glowing.objects.push(object.clone());
         }
         let detail = detail(object, need);
-        let failed = |e: polyptych_core::convert::ConvertError| RenderError::Failed(e.to_string());
         if accepts.contains(&ShapeKind::Mesh) {
-            let model = converter.mesh(scene, object, detail, control.threads).map_err(failed)?;
+            let model = converter.mesh(scene, object, detail, control)?;
             handed.objects[index].shape = before.mesh(&model, &mut used);
             objects.push(handing(object, model.bound, &model.why));
         } else {
-            let model = converter.voxels(scene, object, detail, control.threads).map_err(failed)?;
+            let model = converter.voxels(scene, object, detail, control)?;
             let first = handed.materials.len();
             handed.materials.extend(model.palette.iter().cloned());
             let placed = &mut handed.objects[index];

@@ -53,6 +53,7 @@ impl Easel {
         }
         let begin = Instant::now();
         let prepared = self.prepare(order, stop)?;
+        desk.is_prepared();
         let prepare = begin.elapsed();
         let mut coarse = coarseness(self.expected(order), order.pace);
         let mut before: Option<Arc<ColorImage>> = None;

@@ -2,7 +2,8 @@
 //! ordered last.
 //!
 //! A new order stops the running one, but for a coarse picture that will soon be done: while a camera moves, orders
-//! come faster than pictures, and the coarse ones are what is then seen.
+//! come faster than pictures, and the coarse ones are what is then seen. Nor does a camera that moves stop what is being
+//! prepared for it: begun anew with every move, that would never be done.
 
 mod crew;
 mod easel;
@@ -79,15 +80,22 @@ struct State {
 /// The order that is being drawn.
 struct Running {
     stop: Arc<AtomicBool>,
+    /// Since when pictures are drawn, or prepared.
     begun: Instant,
     is_coarse: bool,
+    /// The order as long as it is being prepared.
+    preparing: Option<Order>,
     stopped: Option<Instant>,
 }
 
 impl Running {
-    /// Stops the work, unless its coarse picture is about to be done.
-    fn give_way(&mut self) {
-        if !(self.is_coarse && self.begun.elapsed() < PATIENCE) {
+    /// Stops the work, unless its coarse picture is about to be done, or what is being prepared serves the next order.
+    fn give_way(&mut self, next: &Order) {
+        let goes_on = match &self.preparing {
+            Some(order) => order.is_but_for_camera(next),
+            None => self.is_coarse && self.begun.elapsed() < PATIENCE,
+        };
+        if !goes_on {
             self.stop();
         }
     }
@@ -124,7 +132,7 @@ impl Painter {
     pub(crate) fn order(&self, order: Order) {
         let mut state = self.desk.lock();
         if let Some(running) = &mut state.running {
-            running.give_way();
+            running.give_way(&order);
         }
         state.order = Some(order);
         self.desk.ordered.notify_one();
@@ -187,8 +195,13 @@ impl Desk {
             }
             if let Some(order) = state.order.take() {
                 let stop = Arc::new(AtomicBool::new(false));
-                let begun = Instant::now();
-                state.running = Some(Running { stop: stop.clone(), begun, is_coarse: true, stopped: None });
+                state.running = Some(Running {
+                    stop: stop.clone(),
+                    begun: Instant::now(),
+                    is_coarse: true,
+                    preparing: Some(order.clone()),
+                    stopped: None,
+                });
                 return Some((order, stop));
             }
             drop(state);
@@ -198,6 +211,13 @@ impl Desk {
             if state.order.is_none() && !state.is_closed {
                 state = self.ordered.wait(state).unwrap_or_else(PoisonError::into_inner);
             }
+        }
+    }
+
+    /// Begins the coarse picture: all is prepared.
+    fn is_prepared(&self) {
+        if let Some(running) = &mut self.lock().running {
+            (running.preparing, running.begun) = (None, Instant::now());
         }
     }
 
@@ -230,3 +250,36 @@ fn yield_to_the_window() {
 
 #[cfg(not(target_os = "linux"))]
 fn yield_to_the_window() {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use polyptych::camera::{Camera, Projection};
+    use polyptych::framebuffer::Channel;
+    use polyptych::scene::Scene;
+    use polyptych::seam::Need;
+
+    #[test]
+    fn a_moved_camera_does_not_stop_what_is_prepared_for_it() {
+        let scene = Arc::new(Scene::default());
+        let order = |from: DVec3, scene: &Arc<Scene>| {
+            let view = Projection::Orthographic { height: 2.0 };
+            let need = Need::new(Camera::look_at(from, DVec3::ZERO, DVec3::Y, view), 8, 8);
+            let (backend, pace) = ("raster".to_owned(), Pace::Full);
+            Order { backend, scene: scene.clone(), need, channel: Channel::Color, pace }
+        };
+        let first = order(DVec3::Z, &scene);
+        let (moved, other) = (order(DVec3::X, &scene), order(DVec3::Z, &Arc::new(Scene::default())));
+        let is_stopped_by = |preparing: Option<Order>, is_coarse: bool, next: &Order| {
+            let stop = Arc::new(AtomicBool::new(false));
+            let begun = Instant::now();
+            let mut running = Running { stop: stop.clone(), begun, is_coarse, preparing, stopped: None };
+            running.give_way(next);
+            stop.load(Ordering::Relaxed)
+        };
+        assert!(!is_stopped_by(Some(first.clone()), true, &moved));
+        assert!(is_stopped_by(Some(first), true, &other), "of no use for another scene");
+        assert!(is_stopped_by(None, false, &moved), "a full picture gives way");
+    }
+}

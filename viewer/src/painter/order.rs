@@ -31,10 +31,17 @@ pub(crate) enum Pace {
 impl Order {
     /// Tells whether both would give the same picture.
     pub(crate) fn is(&self, other: &Self) -> bool {
+        self.is_but_for_camera(other)
+            && (self.channel, self.pace) == (other.channel, other.pace)
+            && self.need.camera == other.need.camera
+    }
+
+    /// Tells whether both ask for the same to be prepared: what is prepared for a camera serves all.
+    pub(crate) fn is_but_for_camera(&self, other: &Self) -> bool {
         let (a, b) = (&self.need, &other.need);
         Arc::ptr_eq(&self.scene, &other.scene)
-            && (&self.backend, self.channel, self.pace) == (&other.backend, other.channel, other.pace)
-            && (&a.camera, a.width, a.height, a.channels, a.tolerance_px, a.samples, &a.settings)
-                == (&b.camera, b.width, b.height, b.channels, b.tolerance_px, b.samples, &b.settings)
+            && self.backend == other.backend
+            && (a.width, a.height, a.channels, a.tolerance_px, a.samples, &a.settings)
+                == (b.width, b.height, b.channels, b.tolerance_px, b.samples, &b.settings)
     }
 }

@@ -4,11 +4,11 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::{Converter, Detail};
 use polyptych_core::load::{LoadOptions, load};
-use polyptych_core::parallel::OneThread;
 use polyptych_core::scene::{
     Background, Form, FreeForm, Light, Mapping, Material, Mesh, Object, Perturbation, Power, Scene, Shape,
     Texture, Voxels, color_text,
 };
+use polyptych_core::seam::Control;
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
@@ -74,7 +74,7 @@ fn mesh_of(name: &str, form: Form, color: &str) -> Result<Scene, Box<dyn Error>>
     let material = scene.add_material(material);
     let object = Object::new(name, Shape::FreeForm(FreeForm::new(form)?), material);
     let detail = Detail { tolerance: object.bounds().radius() * 1e-3, max_resolution: 128 };
-    let model = Converter::default().mesh(&scene, &object, detail, &OneThread)?;
+    let model = Converter::default().mesh(&scene, &object, detail, &Control::simple())?;
     scene.objects.push(Object::new(name, Shape::Mesh(model.mesh.clone()), material));
     Ok(scene)
 }

@@ -11,8 +11,8 @@ use crate::grid::Chunks;
 use crate::occupancy::Values;
 use glam::DVec3;
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
-use polyptych_core::parallel::OneThread;
 use polyptych_core::scene::Voxels;
+use polyptych_core::seam::Control;
 use worlds::Kind;
 
 /// Places are multiples of 2^-20 and parts of directions multiples of 2^-40: what they are multiplied to fits 128 bits.
@@ -67,7 +67,7 @@ fn cell_of(walk: &Walk, found: Found) -> Option<[i32; 3]> {
 fn count(kind: Kind, size: [u32; 3], [width, height]: [u32; 2], wrong: &mut Wrong) {
     let voxels = kind.build(size);
     let all = Values::of(|_| true);
-    let grid = Chunks::default().grid(&voxels, all, all, &OneThread);
+    let grid = Chunks::default().grid(&voxels, all, all, &Control::simple()).unwrap();
     let (eye, target) = kind.view(&voxels);
     let eye = (eye * PLACE).round() / PLACE;
     let forward = (target - eye).normalize_or(DVec3::X);

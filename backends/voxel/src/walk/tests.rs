@@ -7,8 +7,8 @@ use super::*;
 use crate::grid::{Chunks, Grid};
 use crate::occupancy::Values;
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
-use polyptych_core::parallel::OneThread;
 use polyptych_core::scene::Voxels;
+use polyptych_core::seam::Control;
 use std::sync::Arc;
 
 struct Random(u64);
@@ -38,7 +38,7 @@ fn hash(x: u32, y: u32, z: u32) -> u32 {
 
 fn ready(voxels: &Voxels) -> Arc<Grid> {
     let all = Values::of(|_| true);
-    Chunks::default().grid(voxels, all, all, &OneThread)
+    Chunks::default().grid(voxels, all, all, &Control::simple()).unwrap()
 }
 
 fn grids() -> Vec<(&'static str, Voxels)> {

@@ -3,8 +3,8 @@
 use super::Grid;
 use super::slab::Slab;
 use crate::math::Aabb;
-use crate::parallel::{Threads, for_each_mut};
 use crate::scene::{Form, Object, Scene, Volume};
+use crate::seam::{Cancelled, Control};
 use glam::{DVec3, Vec3};
 
 /// Texture coordinates of a point of the surface with its normal, where the shape has any.
@@ -18,8 +18,8 @@ pub(super) fn fill_form(
     grid: &Grid,
     uv: &UvAt<'_>,
     slabs: &mut [Slab],
-    threads: &dyn Threads,
-) {
+    control: &Control<'_>,
+) -> Result<(), Cancelled> {
     let form = &form.lowered();
     let material = scene.material(object, 0);
     let color_of = |cell: [u32; 3]| {
@@ -31,9 +31,12 @@ pub(super) fn fill_form(
         let n = -form.value_and_gradient(p).1.normalize_or(DVec3::Y);
         scene.base_color(material, uv(p, n), p.as_vec3(), n.as_vec3(), 0.0).0
     };
-    for_each_mut(threads, slabs, 1, &|_, slab| {
+    control.for_each_mut(slabs, 1, &|_, slab| {
         let mut stack = vec![([0, 0, slab.from], [grid.size[0], grid.size[1], slab.to])];
         while let Some((from, to)) = stack.pop() {
+            if control.is_cancelled() {
+                return;
+            }
             let box_ = Aabb::new(grid.corner(from), grid.corner(to));
             let range = form.interval(&box_);
             if range.hi < 0.0 {
@@ -50,15 +53,24 @@ pub(super) fn fill_form(
                 continue;
             }
             if solid || form.value(box_.center()) >= 0.0 {
-                fill_box(slab, from, to, &color_of);
+                fill_box(slab, from, to, &color_of, control);
             }
         }
-    });
+    })
 }
 
-fn fill_box(slab: &mut Slab, from: [u32; 3], to: [u32; 3], color_of: &impl Fn([u32; 3]) -> Vec3) {
+fn fill_box(
+    slab: &mut Slab,
+    from: [u32; 3],
+    to: [u32; 3],
+    color_of: &impl Fn([u32; 3]) -> Vec3,
+    control: &Control<'_>,
+) {
     for z in from[2]..to[2] {
         for y in from[1]..to[1] {
+            if control.is_cancelled() {
+                return;
+            }
             for x in from[0]..to[0] {
                 slab.fill([x, y, z], 0, color_of([x, y, z]));
             }
@@ -67,10 +79,13 @@ fn fill_box(slab: &mut Slab, from: [u32; 3], to: [u32; 3], color_of: &impl Fn([u
 }
 
 /// Fills the cells in whose middle a volume is as opaque as at its surface.
-pub(super) fn fill_volume(volume: &Volume, grid: &Grid, slab: &mut Slab) {
+pub(super) fn fill_volume(volume: &Volume, grid: &Grid, slab: &mut Slab, control: &Control<'_>) {
     let level = f64::from(volume.transfer.surface_value());
     for z in slab.from..slab.to {
         for y in 0..grid.size[1] {
+            if control.is_cancelled() {
+                return;
+            }
             for x in 0..grid.size[0] {
                 let p = grid.corner([x, y, z]) + grid.cell * 0.5;
                 let value = volume.value(p);
@@ -84,7 +99,12 @@ pub(super) fn fill_volume(volume: &Volume, grid: &Grid, slab: &mut Slab) {
 }
 
 /// Empties the cells that have no empty neighbor: over a face, or over an edge or a corner, too.
-pub(super) fn hollow(size: [u32; 3], bytes: &[u8], corners: bool, threads: &dyn Threads) -> Vec<u8> {
+pub(super) fn hollow(
+    size: [u32; 3],
+    bytes: &[u8],
+    corners: bool,
+    control: &Control<'_>,
+) -> Result<Vec<u8>, Cancelled> {
     let [nx, ny, nz] = size.map(|s| s as usize);
     let steps: Vec<[isize; 3]> = (0..27)
         .map(|k: isize| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1])
@@ -96,14 +116,14 @@ pub(super) fn hollow(size: [u32; 3], bytes: &[u8], corners: bool, threads: &dyn 
         bytes[(z * ny + y) * nx + x] == 0
     };
     let mut skin = vec![0u8; bytes.len()];
-    let mut layers: Vec<&mut [u8]> = skin.chunks_mut(nx * ny).collect();
-    for_each_mut(threads, &mut layers, 1, &|z, layer| {
-        for (i, byte) in layer.iter_mut().enumerate() {
-            let value = bytes[z * nx * ny + i];
-            if value != 0 && steps.iter().any(|step| is_empty([i % nx, i / nx, z], step)) {
+    let mut rows: Vec<&mut [u8]> = skin.chunks_mut(nx).collect();
+    control.for_each_mut(&mut rows, 8, &|row, cells| {
+        for (x, byte) in cells.iter_mut().enumerate() {
+            let value = bytes[row * nx + x];
+            if value != 0 && steps.iter().any(|step| is_empty([x, row % ny, row / ny], step)) {
                 *byte = value;
             }
         }
-    });
-    skin
+    })?;
+    Ok(skin)
 }

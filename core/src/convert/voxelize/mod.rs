@@ -13,10 +13,10 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-use super::{Filling, VoxelModel, distance, height_mesh, primitive_mesh};
+use super::{ConvertError, Filling, VoxelModel, distance, height_mesh, primitive_mesh};
 use crate::math::Aabb;
-use crate::parallel::{Threads, for_each_mut};
 use crate::scene::{FreeForm, Object, Scene, Shape, Voxels};
+use crate::seam::{Cancelled, Control};
 use glam::{DAffine3, DVec3};
 use slab::Slab;
 use surface::Surface;
@@ -39,8 +39,8 @@ pub(super) fn voxelize(
     tolerance: f64,
     max_resolution: u32,
     filling: Filling,
-    threads: &dyn Threads,
-) -> Result<VoxelModel, String> {
+    control: &Control<'_>,
+) -> Result<VoxelModel, ConvertError> {
     let bounds = object.shape.bounds();
     if let Shape::Voxels(voxels) = &*object.shape {
         return Ok(VoxelModel {
@@ -57,35 +57,36 @@ pub(super) fn voxelize(
     let mut why = format!("{}x{}x{} voxels", size[0], size[1], size[2]);
     let on = |mesh| Surface { scene, object, mesh, grid: &grid };
     let is_body = match &*object.shape {
-        Shape::Mesh(mesh) => fill_mesh(&on(mesh), filling, &mut slabs, threads, &mut why),
+        Shape::Mesh(mesh) => fill_mesh(&on(mesh), filling, &mut slabs, control, &mut why)?,
         Shape::HeightField(field) => {
-            let mesh = height_mesh::triangulate(field, 0.0).0;
-            fill_mesh(&on(&mesh), filling, &mut slabs, threads, &mut why)
+            let mesh = height_mesh::triangulate(field, 0.0, control)?.0;
+            fill_mesh(&on(&mesh), filling, &mut slabs, control, &mut why)?
         }
         Shape::Primitive(primitive) => match FreeForm::from_primitive(primitive) {
             Some(form) => {
                 let surface = |p: DVec3, n: DVec3| Some(primitive.uv(p, n));
-                body::fill_form(scene, object, form.form(), &grid, &surface, &mut slabs, threads);
+                body::fill_form(scene, object, form.form(), &grid, &surface, &mut slabs, control)?;
                 true
             }
             None => {
                 let mesh = primitive_mesh::tessellate(primitive, cell).0;
-                fill_mesh(&on(&mesh), filling, &mut slabs, threads, &mut why)
+                fill_mesh(&on(&mesh), filling, &mut slabs, control, &mut why)?
             }
         },
         Shape::FreeForm(form) => {
-            body::fill_form(scene, object, form.form(), &grid, &|_, _| None, &mut slabs, threads);
+            body::fill_form(scene, object, form.form(), &grid, &|_, _| None, &mut slabs, control)?;
             true
         }
         Shape::Volume(volume) => {
-            for_each_mut(threads, &mut slabs, 1, &|_, slab| body::fill_volume(volume, &grid, slab));
+            control
+                .for_each_mut(&mut slabs, 1, &|_, slab| body::fill_volume(volume, &grid, slab, control))?;
             true
         }
         Shape::Voxels(_) => true,
     };
-    let (mut bytes, palette) = slab::choose_colors(scene, object, &mut slabs, threads)?;
+    let (mut bytes, palette) = slab::choose_colors(scene, object, &mut slabs, control)?;
     if is_body && matches!(filling, Filling::Surface | Filling::Thin) {
-        bytes = body::hollow(size, &bytes, filling == Filling::Surface, threads);
+        bytes = body::hollow(size, &bytes, filling == Filling::Surface, control)?;
         why.push_str(", hollow");
     }
     Ok(VoxelModel {
@@ -102,18 +103,18 @@ fn fill_mesh(
     surface: &Surface<'_>,
     filling: Filling,
     slabs: &mut [Slab],
-    threads: &dyn Threads,
+    control: &Control<'_>,
     why: &mut String,
-) -> bool {
+) -> Result<bool, Cancelled> {
     match filling {
-        Filling::Natural | Filling::Surface => surface::fill_touched(surface, slabs, threads),
-        Filling::Thin => surface::fill_thinly(surface, slabs, threads),
+        Filling::Natural | Filling::Surface => surface::fill_touched(surface, slabs, control)?,
+        Filling::Thin => surface::fill_thinly(surface, slabs, control)?,
         Filling::Solid => {
-            solid::fill(surface, slabs, threads);
+            solid::fill(surface, slabs, control)?;
             // What encloses nothing is still to be seen.
-            let (border, _) = distance::border_edges(surface.mesh);
+            let (border, _) = distance::border_edges(surface.mesh, control)?;
             if border > 0 {
-                surface::fill_thinly(surface, slabs, threads);
+                surface::fill_thinly(surface, slabs, control)?;
                 let edges = if border == 1 { "edge" } else { "edges" };
                 why.push_str(&format!(
                     "; open at {border} {edges}, so that most of six directions tell what is inside"
@@ -124,7 +125,7 @@ fn fill_mesh(
     if matches!(filling, Filling::Thin | Filling::Solid) {
         why.push_str("; parts that are thinner than a cell may be missing");
     }
-    false
+    Ok(false)
 }
 
 /// A box of cubic cells in object space.

@@ -1,8 +1,9 @@
 //! Which colors have the cells of a few layers?
 
+use super::super::ConvertError;
 use super::super::palette::{ColorCollector, ColorKey};
-use crate::parallel::{Threads, for_each_mut};
 use crate::scene::{Material, Object, Scene};
+use crate::seam::Control;
 use glam::Vec3;
 use std::collections::HashMap;
 
@@ -110,15 +111,16 @@ pub(super) fn choose_colors(
     scene: &Scene,
     object: &Object,
     slabs: &mut [Slab],
-    threads: &dyn Threads,
-) -> Result<(Vec<u8>, Vec<Material>), String> {
+    control: &Control<'_>,
+) -> Result<(Vec<u8>, Vec<Material>), ConvertError> {
     let mut colors = ColorCollector::default();
     for slab in &mut *slabs {
+        control.check()?;
         slab.flush();
         colors.merge(&slab.colors);
     }
     if slabs.iter().all(|slab| slab.keys.is_empty()) {
-        return Err("it fills no voxel: it is empty or thinner than a cell".to_owned());
+        return Err(ConvertError::of(object, "it fills no voxel: it is empty or thinner than a cell"));
     }
     let palette = colors.choose(scene, object);
     let mut bytes = vec![0u8; slabs.iter().map(|slab| slab.cells.len()).sum()];
@@ -129,12 +131,12 @@ pub(super) fn choose_colors(
         rest = others;
         parts.push((part, slab));
     }
-    for_each_mut(threads, &mut parts, 1, &|_, (bytes, slab)| {
+    control.for_each_mut(&mut parts, 1, &|_, (bytes, slab)| {
         let byte_of: Vec<u8> =
             std::iter::once(0).chain(slab.keys.iter().map(|&key| palette.byte(key))).collect();
         for (byte, &number) in bytes.iter_mut().zip(&slab.cells) {
             *byte = byte_of[number as usize];
         }
-    });
+    })?;
     Ok((bytes, palette.materials))
 }

@@ -10,7 +10,7 @@
 use super::lines::{Crossing, for_each_crossing};
 use super::slab::Slab;
 use super::surface::{Surface, triangles_of_slabs};
-use crate::parallel::{Threads, for_each_mut};
+use crate::seam::{Cancelled, Control};
 
 /// Directions that must call a middle inside. With three, a line that grazes the rim of one hole and leaves by another
 /// would do.
@@ -18,37 +18,42 @@ const ENOUGH: i32 = 4;
 
 /// Fills the cells whose middles are inside. They have the color of the surface beside them, and within the body that
 /// of the surface before them in their row.
-pub(super) fn fill(surface: &Surface<'_>, slabs: &mut [Slab], threads: &dyn Threads) {
+pub(super) fn fill(
+    surface: &Surface<'_>,
+    slabs: &mut [Slab],
+    control: &Control<'_>,
+) -> Result<(), Cancelled> {
     let columns = surface.grid.size[0] as usize * surface.grid.size[1] as usize;
-    let reaching = triangles_of_slabs(surface, slabs, 1);
+    let reaching = triangles_of_slabs(surface, slabs, 1, control)?;
     // Upright lines go through all slabs: what lies below each one comes first.
     let mut below: Vec<Vec<i32>> = slabs.iter().map(|_| vec![0; columns]).collect();
     let mut parts: Vec<_> = slabs.iter().zip(&reaching).zip(&mut below).collect();
-    for_each_mut(threads, &mut parts, 1, &|_, ((slab, triangles), sums)| {
-        for_each_in(surface, slab, triangles, 2, &mut |_, crossing| {
+    control.for_each_mut(&mut parts, 1, &|_, ((slab, triangles), sums)| {
+        for_each_in((surface, control), slab, triangles, 2, &mut |_, crossing| {
             if let Some(cell) = first_behind(surface, slab, &crossing) {
                 sums[column(surface, cell)] += crossing.sign;
             }
         });
-    });
+    })?;
     drop(parts);
     let mut all = vec![0; columns];
     for sums in &mut below {
+        control.check()?;
         for (sum, all) in sums.iter_mut().zip(&mut all) {
             let own = std::mem::replace(sum, *all);
             *all += own;
         }
     }
     let mut parts: Vec<_> = slabs.iter_mut().zip(&reaching).zip(&below).collect();
-    for_each_mut(threads, &mut parts, 1, &|_, ((slab, triangles), below)| {
-        let inside = inside(surface, slab, triangles, [below, &all]);
-        paint(surface, slab, triangles, &inside);
-    });
+    control.for_each_mut(&mut parts, 1, &|_, ((slab, triangles), below)| {
+        let inside = inside((surface, control), slab, triangles, [below, &all]);
+        paint((surface, control), slab, triangles, &inside);
+    })
 }
 
-/// Visits the crossings of all lines along an axis that a slab has to do with.
+/// Visits the crossings of all lines along an axis that a slab has to do with, until the host wants to stop.
 fn for_each_in(
-    surface: &Surface<'_>,
+    (surface, control): (&Surface<'_>, &Control<'_>),
     slab: &Slab,
     triangles: &[u32],
     axis: usize,
@@ -57,6 +62,9 @@ fn for_each_in(
     let [nx, ny, _] = surface.grid.size;
     let cells = [0..nx, 0..ny, slab.from..slab.to];
     for &t in triangles {
+        if control.is_cancelled() {
+            return;
+        }
         for_each_crossing(surface.corners(t as usize), axis, &cells, 0.0, &mut |c| visit(t as usize, c));
     }
 }
@@ -74,7 +82,12 @@ fn column(surface: &Surface<'_>, [x, y, _]: [i64; 3]) -> usize {
 }
 
 /// Tells for each cell of a slab whether its middle is inside.
-fn inside(surface: &Surface<'_>, slab: &Slab, triangles: &[u32], [below, all]: [&[i32]; 2]) -> Vec<bool> {
+fn inside(
+    (surface, control): (&Surface<'_>, &Control<'_>),
+    slab: &Slab,
+    triangles: &[u32],
+    [below, all]: [&[i32]; 2],
+) -> Vec<bool> {
     let size = [surface.grid.size[0], surface.grid.size[1], slab.to - slab.from].map(|s| s as usize);
     let stride = [1, size[0], size[0] * size[1]];
     let count = size[0] * size[1] * size[2];
@@ -84,7 +97,7 @@ fn inside(surface: &Surface<'_>, slab: &Slab, triangles: &[u32], [below, all]: [
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut sums = vec![0i32; size[u] * size[v]];
         let first = [0, 0, i64::from(slab.from)];
-        for_each_in(surface, slab, triangles, axis, &mut |_, crossing| {
+        for_each_in((surface, control), slab, triangles, axis, &mut |_, crossing| {
             let Some(cell) = first_behind(surface, slab, &crossing) else { return };
             let cell: [usize; 3] = std::array::from_fn(|a| (cell[a] - first[a]).max(0) as usize);
             sums[cell[v] * size[u] + cell[u]] += crossing.sign;
@@ -93,6 +106,9 @@ fn inside(surface: &Surface<'_>, slab: &Slab, triangles: &[u32], [below, all]: [
             }
         });
         for j in 0..size[v] {
+            if control.is_cancelled() {
+                return vec![false; count];
+            }
             for i in 0..size[u] {
                 let line = j * size[u] + i;
                 let (mut behind, total) = if axis == 2 { (below[line], all[line]) } else { (0, sums[line]) };
@@ -110,11 +126,16 @@ fn inside(surface: &Surface<'_>, slab: &Slab, triangles: &[u32], [below, all]: [
 }
 
 /// Gives the cells inside their colors.
-fn paint(surface: &Surface<'_>, slab: &mut Slab, triangles: &[u32], inside: &[bool]) {
+fn paint(
+    (surface, control): (&Surface<'_>, &Control<'_>),
+    slab: &mut Slab,
+    triangles: &[u32],
+    inside: &[bool],
+) {
     let [nx, ny, _] = surface.grid.size.map(i64::from);
     for axis in 0..3 {
         let mut beside = Vec::new();
-        for_each_in(surface, slab, triangles, axis, &mut |t, crossing| {
+        for_each_in((surface, control), slab, triangles, axis, &mut |t, crossing| {
             let before = crossing.along.floor() as i64;
             for [x, y, z] in [crossing.cell(before), crossing.cell(before + 1)] {
                 let is_here = (0..nx).contains(&x) && (0..ny).contains(&y);
@@ -124,6 +145,9 @@ fn paint(surface: &Surface<'_>, slab: &mut Slab, triangles: &[u32], inside: &[bo
             }
         });
         for (cell, t, crossing) in beside {
+            if control.is_cancelled() {
+                return;
+            }
             if inside[slab.index(cell)]
                 && let Some(color) = surface.color(t, crossing.place())
             {

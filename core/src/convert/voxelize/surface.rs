@@ -6,8 +6,8 @@ use super::Grid;
 use super::lines::for_each_crossing;
 use super::slab::Slab;
 use crate::math::Aabb;
-use crate::parallel::{Threads, for_each_mut};
 use crate::scene::{Mesh, Object, Scene};
+use crate::seam::{Cancelled, Control};
 use glam::{DVec3, Vec3};
 
 /// Triangles over a grid.
@@ -32,10 +32,16 @@ impl Surface<'_> {
 }
 
 /// Lists which triangles reach into each slab, or come so many cells near to it, in their order.
-pub(super) fn triangles_of_slabs(surface: &Surface<'_>, slabs: &[Slab], margin: u32) -> Vec<Vec<u32>> {
+pub(super) fn triangles_of_slabs(
+    surface: &Surface<'_>,
+    slabs: &[Slab],
+    margin: u32,
+    control: &Control<'_>,
+) -> Result<Vec<Vec<u32>>, Cancelled> {
     let grid = surface.grid;
     let mut reaching = vec![Vec::new(); slabs.len()];
     for t in 0..surface.mesh.triangles.len() {
+        control.check()?;
         let corners = surface.mesh.corners(t).map(Vec3::as_dvec3);
         if corners.iter().all(|p| p.is_finite()) {
             let box_ = Aabb::of_points(corners);
@@ -46,12 +52,16 @@ pub(super) fn triangles_of_slabs(surface: &Surface<'_>, slabs: &[Slab], margin: 
             }
         }
     }
-    reaching
+    Ok(reaching)
 }
 
 /// Fills every cell that a triangle touches.
-pub(super) fn fill_touched(surface: &Surface<'_>, slabs: &mut [Slab], threads: &dyn Threads) {
-    fill_each(surface, slabs, threads, fill_triangle);
+pub(super) fn fill_touched(
+    surface: &Surface<'_>,
+    slabs: &mut [Slab],
+    control: &Control<'_>,
+) -> Result<(), Cancelled> {
+    fill_each(surface, slabs, control, fill_triangle)
 }
 
 /// Cracks that are narrower, in cells, are closed: corners that ought to be one may differ by a rounding of their 32 bits,
@@ -62,23 +72,30 @@ const CRACK: f64 = 1e-4;
 /// faces of cells goes from middle to middle along such lines, so that it must go through one of these cells.
 ///
 /// Source: S. Laine, *A Topological Approach to Voxelization*, EGSR 2013 (intersection targets).
-pub(super) fn fill_thinly(surface: &Surface<'_>, slabs: &mut [Slab], threads: &dyn Threads) {
-    fill_each(surface, slabs, threads, cross_triangle);
+pub(super) fn fill_thinly(
+    surface: &Surface<'_>,
+    slabs: &mut [Slab],
+    control: &Control<'_>,
+) -> Result<(), Cancelled> {
+    fill_each(surface, slabs, control, cross_triangle)
 }
 
 fn fill_each(
     surface: &Surface<'_>,
     slabs: &mut [Slab],
-    threads: &dyn Threads,
+    control: &Control<'_>,
     fill: fn(&Surface<'_>, usize, &mut Slab),
-) {
-    let reaching = triangles_of_slabs(surface, slabs, 0);
+) -> Result<(), Cancelled> {
+    let reaching = triangles_of_slabs(surface, slabs, 0, control)?;
     let mut parts: Vec<_> = slabs.iter_mut().zip(reaching).collect();
-    for_each_mut(threads, &mut parts, 1, &|_, (slab, triangles)| {
+    control.for_each_mut(&mut parts, 1, &|_, (slab, triangles)| {
         for &t in &*triangles {
+            if control.is_cancelled() {
+                return;
+            }
             fill(surface, t as usize, slab);
         }
-    });
+    })
 }
 
 fn cross_triangle(surface: &Surface<'_>, t: usize, slab: &mut Slab) {

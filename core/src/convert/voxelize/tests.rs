@@ -1,7 +1,7 @@
 //! Are the cells that are filled those that were promised?
 
 use super::*;
-use crate::parallel::{OneThread, Pool};
+use crate::parallel::Pool;
 use crate::scene::{Material, Mesh, Primitive};
 use glam::{DQuat, Vec3};
 use std::collections::BTreeSet;
@@ -18,7 +18,8 @@ fn the_volume_of_a_ball_converges_to_the_closed_form() {
     let object = Object::new("ball", Shape::Primitive(Primitive::Sphere { radius: 1.0 }), 0);
     let exact = 4.0 / 3.0 * std::f64::consts::PI;
     for resolution in [32, 64, 128] {
-        let model = voxelize(&scene(), &object, 0.0, resolution, Filling::Natural, &OneThread).unwrap();
+        let model =
+            voxelize(&scene(), &object, 0.0, resolution, Filling::Natural, &Control::simple()).unwrap();
         let cell = model.bound / 3f64.sqrt();
         let error = (model.voxels.filled() as f64 * cell.powi(3) - exact).abs();
         // First order in the cell, with a constant far below the area's 4 pi.
@@ -49,7 +50,7 @@ fn bodies() -> Mesh {
 
 fn model(mesh: &Mesh, resolution: u32, filling: Filling) -> VoxelModel {
     let object = Object::new("mesh", Shape::Mesh(mesh.clone()), 0);
-    voxelize(&scene(), &object, 0.0, resolution, filling, &OneThread).unwrap()
+    voxelize(&scene(), &object, 0.0, resolution, filling, &Control::simple()).unwrap()
 }
 
 fn cells(voxels: &Voxels) -> BTreeSet<[u32; 3]> {
@@ -160,7 +161,7 @@ fn open_meshes_are_filled_where_most_directions_agree_and_are_reported() {
 #[test]
 fn bodies_can_be_made_hollow() {
     let object = Object::new("ball", Shape::Primitive(Primitive::Sphere { radius: 1.0 }), 0);
-    let fill = |filling| voxelize(&scene(), &object, 0.0, 40, filling, &OneThread).unwrap().voxels;
+    let fill = |filling| voxelize(&scene(), &object, 0.0, 40, filling, &Control::simple()).unwrap().voxels;
     let whole = cells(&fill(Filling::Natural));
     assert_eq!(whole, cells(&fill(Filling::Solid)));
     let [thick, thin] = [Filling::Surface, Filling::Thin].map(|filling| cells(&fill(filling)));
@@ -207,13 +208,13 @@ fn any_number_of_threads_fills_the_same_bytes() {
         scene.textures.push(crate::scene::Texture::from_srgb8("halves", 2, 1, &halves).into());
         scene.materials[0].texture = Some(0);
         let object = Object::new("thing", shape, 0);
-        let fill = |threads: &dyn Threads| {
-            let model = voxelize(&scene, &object, 0.0, 45, filling, threads).unwrap();
+        let fill = |control: &Control<'_>| {
+            let model = voxelize(&scene, &object, 0.0, 45, filling, control).unwrap();
             let mut cells = Vec::new();
             model.voxels.for_each_filled(|cell, byte| cells.push((cell, byte)));
             (cells, model.palette)
         };
-        let alone = fill(&OneThread);
-        assert!(alone.1.len() > 1 && fill(&Pool::new(3).unwrap()) == alone);
+        let alone = fill(&Control::simple());
+        assert!(alone.1.len() > 1 && fill(&Control::new(&Pool::new(3).unwrap())) == alone);
     }
 }
