@@ -11,7 +11,7 @@ use crate::setup::{Corners, DepthPlane, Record, STEPS};
 use crate::sieve;
 use crate::transform::{PartOnScreen, ScreenVertices, border};
 use polyptych_core::lanes::LANES;
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::seam::{Cancelled, Control};
 use std::ops::Range;
 
 /// Most runs: enough for a few times as many threads as there usually are.
@@ -77,6 +77,8 @@ pub(crate) struct Bin<T> {
     count: u64,
 }
 
+/// Triangles or lines that are set up between two looks at the stop sign.
+pub(crate) const PIECE: usize = 1024;
 /// Records of a tile that lie together in memory.
 const BLOCK: usize = 8;
 
@@ -124,17 +126,17 @@ impl Bins {
         pass: &Pass<'_>,
         vertices: &[ScreenVertices],
         grid: &TileGrid,
-        threads: &dyn Threads,
-    ) {
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
         let triangles = pass.model.triangles as usize;
         self.used = runs_for(triangles);
         if self.runs.len() < self.used {
             self.runs.resize_with(self.used, Run::default);
         }
         let used = self.used;
-        for_each_mut(threads, &mut self.runs[..used], 1, &|i, run| {
-            run.fill(pass, vertices, grid, run_of(triangles, i, used));
-        });
+        control.for_each_mut(&mut self.runs[..used], 1, &|i, run| {
+            run.fill(pass, vertices, grid, run_of(triangles, i, used), control);
+        })
     }
 
     /// Lists the runs, by rising ids of their triangles.
@@ -169,6 +171,7 @@ impl Run {
         vertices: &[ScreenVertices],
         grid: &TileGrid,
         triangles: Range<usize>,
+        control: &Control<'_>,
     ) {
         for bin in [&mut self.facing, &mut self.averted, &mut self.layers] {
             bin.clear(grid);
@@ -182,7 +185,13 @@ impl Run {
             }
             let end = begin + part.mesh().triangles.len();
             let local = triangles.start.max(begin) - begin..triangles.end.min(end).saturating_sub(begin);
-            self.fill_part(&Setup::new(pass, part, vertices, grid), local);
+            let setup = Setup::new(pass, part, vertices, grid);
+            for piece in local.clone().step_by(PIECE) {
+                if control.is_cancelled() {
+                    return;
+                }
+                self.fill_part(&setup, piece..local.end.min(piece + PIECE));
+            }
         }
     }
 

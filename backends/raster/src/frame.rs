@@ -106,17 +106,17 @@ impl Pipeline {
         let smooth = ready.places.len() > 1;
         let pass = Pass { model: &ready.model, lens, role: Role::Camera, culls_back, smooth, without: None };
         // 1. Where on the picture is every vertex?
-        transform(&ready.model, lens, vertices, control.threads);
+        transform(&ready.model, lens, vertices, control)?;
         work.phases.end("transform");
         // 2. Clip, set up, and sort the triangles into tiles.
         let grid = TileGrid::new(lens.width, lens.height).smooth(smooth);
-        bins.fill(&pass, vertices, &grid, control.threads);
+        bins.fill(&pass, vertices, &grid, control)?;
         work.triangles += bins.triangles();
-        let drawing = ready.lines.as_deref().map(|lines| {
-            let hides = ready.options.mode == Mode::HiddenLine;
-            strokes.fill(lines, &ready.model, lens, vertices, (culls_back, hides), control.threads);
-            Drawing { lines, strokes, hides }
-        });
+        let hides = ready.options.mode == Mode::HiddenLine;
+        if let Some(lines) = &ready.lines {
+            strokes.fill(lines, &ready.model, lens, vertices, (culls_back, hides), control)?;
+        }
+        let drawing = ready.lines.as_deref().map(|lines| Drawing { lines, strokes, hides });
         work.phases.end("bin");
         // 3. Draw tile by tile: visibility, layers, surfaces and light.
         let light = Illumination {

@@ -20,7 +20,6 @@ use glam::{DMat3, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::lanes::{DVec3x8, F32x8, Mask8};
 use polyptych_core::math::{Aabb, orthonormal_basis};
-use polyptych_core::parallel::{Threads, for_each_mut};
 use polyptych_core::scene::{LightKind, Scene};
 use polyptych_core::seam::{Cancelled, Control, Need};
 
@@ -166,7 +165,7 @@ impl Shadows {
             }
         }
         let blockers =
-            if same_blockers { old_blockers } else { blockers(model, origin, old_blockers, control.threads) };
+            if same_blockers { old_blockers } else { blockers(model, origin, old_blockers, control)? };
         let any_holes = model.parts.iter().any(Part::has_holes);
         let mut shadows =
             Self { origin, maps: Vec::with_capacity(lamps.len()), blockers, any_holes, tolerance };
@@ -189,9 +188,9 @@ impl Shadows {
                     let (culls_back, without) = (false, Some(&left_out as &dyn Without));
                     // A cell lists all that touches it; a map shows what its texels' centers show.
                     let pass = Pass { model, lens: &lens, role, culls_back, smooth: exact, without };
-                    transform(model, &lens, vertices, control.threads);
+                    transform(model, &lens, vertices, control)?;
                     let grid = TileGrid::new(lens.width, lens.height).smooth(exact);
-                    bins.fill(&pass, vertices, &grid, control.threads);
+                    bins.fill(&pass, vertices, &grid, control)?;
                     if exact {
                         lens.origin -= origin;
                         map.cells.push(Cells::of(lens, grid, bins));
@@ -199,7 +198,7 @@ impl Shadows {
                     }
                     let mut tiles: Vec<[u32; TILE_PIXELS]> = spare.pop().unwrap_or_default();
                     tiles.resize(grid.count(), [NO_TRIANGLE; TILE_PIXELS]);
-                    draw(scene, &pass, bins, &grid, &mut tiles, control.threads);
+                    draw(scene, &pass, bins, &grid, &mut tiles, control)?;
                     lens.origin -= origin;
                     map.faces.push(MapFace { lens, grid, tiles });
                 }
@@ -264,17 +263,22 @@ impl Shadows {
 }
 
 /// Lists the corners of all triangles, in memory that was used before.
-fn blockers(model: &Model, origin: DVec3, memory: Vec<Blocker>, threads: &dyn Threads) -> Vec<Blocker> {
+fn blockers(
+    model: &Model,
+    origin: DVec3,
+    memory: Vec<Blocker>,
+    control: &Control<'_>,
+) -> Result<Vec<Blocker>, Cancelled> {
     let mut blockers = memory;
     blockers.resize(model.triangles as usize, Blocker::default());
     for part in &model.parts {
         let count = part.mesh().triangles.len();
         let of_part = &mut blockers[part.first_triangle as usize..][..count];
-        for_each_mut(threads, of_part, 1024, &|triangle, blocker| {
+        control.for_each_mut(of_part, 1024, &|triangle, blocker| {
             *blocker = Blocker(part.corners(triangle, origin).map(DVec3::as_vec3));
-        });
+        })?;
     }
-    blockers
+    Ok(blockers)
 }
 
 /// Returns axes (right, up, backward) of a view along a direction.
@@ -333,9 +337,10 @@ fn draw(
     bins: &Bins,
     grid: &TileGrid,
     tiles: &mut [[u32; TILE_PIXELS]],
-    threads: &dyn Threads,
-) {
-    for_each_mut(threads, tiles, 4, &|index, tile| {
+    control: &Control<'_>,
+) -> Result<(), Cancelled> {
+    debug_assert!(pass.lens.rays == Rays::Parallel || pass.lens.near > 0.0);
+    control.for_each_mut(tiles, 4, &|index, tile| {
         if bins.is_empty(index) {
             tile.fill(NO_TRIANGLE);
             return;
@@ -349,6 +354,5 @@ fn draw(
             });
         }
         *tile = buffer.id;
-    });
-    debug_assert!(pass.lens.rays == Rays::Parallel || pass.lens.near > 0.0);
+    })
 }

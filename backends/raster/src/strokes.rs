@@ -5,7 +5,7 @@
 //! plane of the triangle that is seen there, held against the line's own point; next to the end of a line the triangles
 //! around that corner hide nothing of it. So edges need no offset towards the eye.
 
-use crate::bin::{Bin, RUNS, run_of, runs_for};
+use crate::bin::{Bin, PIECE, RUNS, run_of, runs_for};
 use crate::face::Faces;
 use crate::grid::{Placed, TILE_PIXELS, TILE_WIDTH, TileArea, TileGrid};
 use crate::lens::{GUARD, Homogeneous, Lens};
@@ -14,7 +14,7 @@ use crate::model::{Model, Part};
 use crate::tile::NO_TRIANGLE;
 use crate::transform::{PartOnScreen, ScreenVertices, border};
 use glam::DVec2;
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::seam::{Cancelled, Control};
 use std::sync::atomic::AtomicU32;
 
 /// How far from a line pixels show something of it.
@@ -80,8 +80,8 @@ impl Strokes {
         lens: &Lens,
         vertices: &[ScreenVertices],
         (culls_back, hides): (bool, bool),
-        threads: &dyn Threads,
-    ) {
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
         if hides {
             self.seen.resize_with(lens.width as usize * lens.height as usize, AtomicU32::default);
         }
@@ -91,7 +91,7 @@ impl Strokes {
             self.runs.resize_with(RUNS, Bin::default);
         }
         let used = self.used;
-        for_each_mut(threads, &mut self.runs[..used], 1, &|i, run| {
+        control.for_each_mut(&mut self.runs[..used], 1, &|i, run| {
             run.clear(&grid);
             let of_run = run_of(lines.count(), i, used);
             let mut first = 0;
@@ -101,6 +101,9 @@ impl Strokes {
                     of_run.start.max(first) - first..of_run.end.clamp(first, first + edges.len()) - first;
                 let vertices = PartOnScreen::of(vertices, part);
                 for (k, edge) in edges.get(local.clone()).unwrap_or(&[]).iter().enumerate() {
+                    if k % PIECE == 0 && control.is_cancelled() {
+                        return;
+                    }
                     if culls_back && looks_away(part, edge, lens) {
                         continue;
                     }
@@ -113,7 +116,7 @@ impl Strokes {
                 }
                 first += edges.len();
             }
-        });
+        })
     }
 
     fn of_tile(&self, tile: usize) -> impl Iterator<Item = &Stroke> {

@@ -5,7 +5,7 @@ use crate::model::{Model, Part};
 use crate::setup::{Corners, STEPS, ScreenPoint};
 use glam::Vec3;
 use polyptych_core::lanes::{F64x8, LANES, Mask8, Vec3x8};
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::seam::{Cancelled, Control};
 
 /// Eights of vertices that one thread takes at a time.
 const GRAIN: usize = 256;
@@ -139,16 +139,17 @@ pub(crate) fn transform(
     model: &Model,
     lens: &Lens,
     vertices: &mut Vec<ScreenVertices>,
-    threads: &dyn Threads,
-) {
+    control: &Control<'_>,
+) -> Result<(), Cancelled> {
     vertices.resize(model.eights, ScreenVertices::NONE);
     for part in &model.parts {
         let screen_from_object = lens.for_object(&part.world_from_object);
         let positions = &part.mesh().positions;
         let of_part = &mut vertices[part.first_eight..][..positions.len().div_ceil(LANES)];
-        for_each_mut(threads, of_part, GRAIN, &|i, eight| {
+        control.for_each_mut(of_part, GRAIN, &|i, eight| {
             let end = positions.len().min((i + 1) * LANES);
             *eight = project(lens, &screen_from_object, &positions[i * LANES..end]);
-        });
+        })?;
     }
+    Ok(())
 }

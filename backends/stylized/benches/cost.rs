@@ -1,15 +1,18 @@
 //! What does a style cost above what it shades? Times frames of the rasterizer, of what it delivers to the shader, and
 //! of the shader, in turn, so that all have the same weather; prints medians and shares.
 //!
-//! `cargo bench -p polyptych-stylized -- [WIDTHxHEIGHT] [FRAMES] MODEL...`
+//! `cargo bench -p polyptych-stylized --bench cost -- [WIDTHxHEIGHT] [FRAMES] [moving] MODEL...`
+//!
+//! With `moving` the camera turns a little with each frame, so that nothing of the picture before can stay.
 
+use glam::DMat3;
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::convert::Converter;
 use polyptych_core::framebuffer::{Channel, Channels, Framebuffer};
 use polyptych_core::load::{LoadOptions, load};
 use polyptych_core::parallel::Pool;
 use polyptych_core::scene::{Light, Object, Primitive, Scene, Shape};
-use polyptych_core::seam::{Control, Need, Origin, Registry, Renderer};
+use polyptych_core::seam::{Control, Frame, Need, Origin, Registry, Renderer};
 use polyptych_raster::Raster;
 use polyptych_stylized::Stylized;
 use std::error::Error;
@@ -32,10 +35,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let size = arguments.first().and_then(|a| a.split_once('x')).unwrap_or(("1280", "720"));
     let [width, height] = [size.0.parse()?, size.1.parse()?];
     let frames: usize = arguments.get(1).map_or(Ok(15), |a| a.parse())?;
-    let names = if arguments.len() > 2 { &arguments[2..] } else { &["ball".to_owned()][..] };
-    for name in names {
+    let moves = arguments.get(2).is_some_and(|a| a == "moving");
+    let names = arguments.get(if moves { 3 } else { 2 }..).unwrap_or_default();
+    let ball = ["ball".to_owned()];
+    for name in if names.is_empty() { &ball } else { names } {
         let scene = scene(name)?;
-        measure(name, &scene, width, height, frames)?;
+        measure(name, &scene, [width, height], frames, moves)?;
     }
     Ok(())
 }
@@ -58,9 +63,9 @@ fn scene(name: &str) -> Result<Arc<Scene>, Box<dyn Error>> {
 fn measure(
     name: &str,
     scene: &Arc<Scene>,
-    width: u32,
-    height: u32,
+    [width, height]: [u32; 2],
     frames: usize,
+    moves: bool,
 ) -> Result<(), Box<dyn Error>> {
     let view = Projection::Perspective { fov_y: 0.7 };
     let aspect = f64::from(width) / f64::from(height);
@@ -101,10 +106,14 @@ fn measure(
     // Only what the shader does itself, as its own clock says: lines, and all the rest.
     let mut above: Vec<[Vec<Duration>; 2]> = vec![[Vec::new(), Vec::new()]; renderers.len()];
     for frame in 0..frames + 2 {
+        let turn = if moves { 0.002 * frame as f64 } else { 0.0 };
+        let world_from_camera = need.camera.world_from_camera * DMat3::from_rotation_y(turn);
+        let camera = Camera { world_from_camera, ..need.camera.clone() };
+        let seen = Frame { camera };
         for (i, (_, renderer, target, times)) in renderers.iter_mut().enumerate() {
             target.touch();
             let begin = Instant::now();
-            let report = renderer.render(&need.frame(), target, &control)?;
+            let report = renderer.render(&seen, target, &control)?;
             let time = begin.elapsed();
             if frame >= 2 {
                 times.push(time);

@@ -14,7 +14,7 @@ use crate::style::Styles;
 use glam::DVec3;
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::framebuffer::{Channels, Framebuffer};
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::parallel::Threads;
 use polyptych_core::scene::{Light, Scene};
 use polyptych_core::seam::{Cancelled, Control, Phases};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -91,7 +91,7 @@ impl Buffers {
     ) -> Result<(), Cancelled> {
         let Self { visible, outline, cracks, lines, spans, without, .. } = self;
         let visible = &*visible;
-        spans.fill(visible, control.threads);
+        spans.fill(visible, control)?;
         lines.strokes.clear();
         if !ready.styles.draw_lines() {
             return Ok(());
@@ -100,7 +100,7 @@ impl Buffers {
         let straight = keeps_lines(&camera.projection);
         if straight {
             let sight = Sight { camera, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
-            outline.fill(&outlines.bodies, &sight, control.threads);
+            outline.fill(&outlines.bodies, &sight, control)?;
         } else {
             outline.clear();
         }
@@ -115,15 +115,10 @@ impl Buffers {
             outlined: if straight { &outlines.outlined } else { without },
             colorful: &ready.colorful,
         };
-        for_each_mut(control.threads, cracks, 1, &|band, scratch| {
+        control.for_each_mut(cracks, 1, &|band, scratch| {
             let first = band as u32 * ROWS;
-            if control.is_cancelled() {
-                scratch.strokes.clear();
-            } else {
-                surfaces.find(first..first + ROWS, scratch);
-            }
-        });
-        control.check()?;
+            surfaces.find(first..first + ROWS, scratch);
+        })?;
         for strokes in outline.strokes().chain(cracks.iter().map(|c| &c.strokes[..])) {
             lines.strokes.extend_from_slice(strokes);
         }

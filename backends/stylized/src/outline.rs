@@ -15,7 +15,7 @@ use crate::veil::Veil;
 use glam::{DAffine3, DVec3, Vec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::framebuffer::Framebuffer;
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::seam::{Cancelled, Control};
 use std::sync::Arc;
 
 /// Edges looked at by one worker at a time.
@@ -76,7 +76,12 @@ pub(crate) fn keeps_lines(projection: &Projection) -> bool {
 
 impl Scratch {
     /// Finds the lines of all bodies; see [`Scratch::strokes`].
-    pub(crate) fn fill(&mut self, bodies: &[Body], sight: &Sight<'_>, threads: &dyn Threads) {
+    pub(crate) fn fill(
+        &mut self,
+        bodies: &[Body],
+        sight: &Sight<'_>,
+        control: &Control<'_>,
+    ) -> Result<(), Cancelled> {
         let faces: usize = bodies.iter().map(|b| b.edges.planes.len()).sum();
         self.facing.resize(faces, false);
         let mut rest = &mut self.facing[..];
@@ -84,7 +89,7 @@ impl Scratch {
         for (index, body) in bodies.iter().enumerate() {
             let (own, others) = rest.split_at_mut(body.edges.planes.len());
             rest = others;
-            turn(body, sight.camera, own, threads);
+            turn(body, sight.camera, own, control)?;
             for first in (0..body.edges.edges.len()).step_by(PIECE) {
                 if count == self.pieces.len() {
                     self.pieces.push(Piece::default());
@@ -99,12 +104,12 @@ impl Scratch {
         }
         self.pieces[count..].iter_mut().for_each(|piece| piece.strokes.clear());
         if count > 0 {
-            self.veil.fill(sight.visible, threads);
+            self.veil.fill(sight.visible, control)?;
         }
         let (facing, veil) = (&self.facing[..], &self.veil);
-        for_each_mut(threads, &mut self.pieces[..count], 1, &|_, piece| {
+        control.for_each_mut(&mut self.pieces[..count], 1, &|_, piece| {
             piece.find(bodies, facing, sight, veil);
-        });
+        })
     }
 
     /// Lists the lines piece by piece, in the order of bodies and edges.
@@ -123,7 +128,7 @@ impl Scratch {
 }
 
 /// Tells which faces of a body are turned to the eye.
-fn turn(body: &Body, camera: &Camera, facing: &mut [bool], threads: &dyn Threads) {
+fn turn(body: &Body, camera: &Camera, facing: &mut [bool], control: &Control<'_>) -> Result<(), Cancelled> {
     let object_from_world = body.world_from_object.inverse();
     // A homogeneous eye: a place, or for parallel rays a direction.
     let (eye, weight) = match camera.projection {
@@ -132,10 +137,10 @@ fn turn(body: &Body, camera: &Camera, facing: &mut [bool], threads: &dyn Threads
     };
     let eye = eye.as_vec3();
     let planes = &body.edges.planes;
-    for_each_mut(threads, facing, PIECE * 4, &|i, turned| {
+    control.for_each_mut(facing, PIECE * 4, &|i, turned| {
         let [x, y, z, offset] = planes[i];
         *turned = x * eye.x + y * eye.y + z * eye.z > offset * weight;
-    });
+    })
 }
 
 impl Piece {

@@ -3,7 +3,7 @@
 
 use crate::eight::{lacks, union};
 use polyptych_core::framebuffer::Framebuffer;
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::seam::{Cancelled, Control};
 
 /// Columns of a stretch.
 pub(crate) const SPAN: usize = 64;
@@ -31,12 +31,12 @@ pub(crate) struct Spans {
 
 impl Spans {
     /// Looks at a picture.
-    pub(crate) fn fill(&mut self, visible: &Framebuffer, threads: &dyn Threads) {
+    pub(crate) fn fill(&mut self, visible: &Framebuffer, control: &Control<'_>) -> Result<(), Cancelled> {
         let (width, height) = (visible.width() as usize, visible.height() as usize);
         self.columns = width.div_ceil(SPAN);
         self.stretches.resize(self.columns * height, Stretch::Empty);
         let (columns, ids) = (self.columns, visible.id());
-        for_each_mut(threads, &mut self.stretches, GRAIN, &|index, stretch| {
+        control.for_each_mut(&mut self.stretches, GRAIN, &|index, stretch| {
             let (row, left) = (index / columns * width, index % columns * SPAN);
             let ids = &ids[row + left..row + width.min(left + SPAN)];
             *stretch = match (union::<SPAN>(ids) == 0, lacks::<SPAN>(ids)) {
@@ -44,7 +44,7 @@ impl Spans {
                 (false, true) => Stretch::Mixed,
                 (false, false) => Stretch::Full,
             };
-        });
+        })
     }
 
     /// Returns the stretches of a row.
@@ -73,7 +73,7 @@ mod tests {
             band.id[2 * 130 - 2..].fill(1);
         });
         let mut spans = Spans::default();
-        spans.fill(&picture, &OneThread);
+        spans.fill(&picture, &Control::simple()).unwrap();
         let [empty, mixed, full] = [Stretch::Empty, Stretch::Mixed, Stretch::Full];
         assert_eq!(spans.row(0), [empty; 3]);
         assert_eq!(spans.row(1), [mixed, empty, full]);

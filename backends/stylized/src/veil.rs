@@ -5,7 +5,7 @@
 
 use polyptych_core::framebuffer::Framebuffer;
 use polyptych_core::lanes::{F32x8, LANES};
-use polyptych_core::parallel::{Threads, for_each_mut};
+use polyptych_core::seam::{Cancelled, Control};
 
 /// Edge of a tile in pixels.
 const TILE: usize = 16;
@@ -22,12 +22,12 @@ pub(crate) struct Veil {
 
 impl Veil {
     /// Looks at a picture.
-    pub(crate) fn fill(&mut self, visible: &Framebuffer, threads: &dyn Threads) {
+    pub(crate) fn fill(&mut self, visible: &Framebuffer, control: &Control<'_>) -> Result<(), Cancelled> {
         let (width, height) = (visible.width() as usize, visible.height() as usize);
         (self.columns, self.rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
         self.farthest.resize(self.columns * self.rows, 0.0);
         let (columns, distances) = (self.columns, visible.distance());
-        for_each_mut(threads, &mut self.farthest, columns.max(1), &|tile, farthest| {
+        control.for_each_mut(&mut self.farthest, columns.max(1), &|tile, farthest| {
             let (left, top) = (tile % columns * TILE, tile / columns * TILE);
             let right = (left + TILE).min(width);
             let mut most = F32x8::ZERO;
@@ -45,7 +45,7 @@ impl Veil {
                 }
             }
             *farthest = most.0.into_iter().fold(0.0, f32::max);
-        });
+        })
     }
 
     /// Tells whether all that is seen around a line is nearer than a distance.
@@ -88,11 +88,11 @@ mod tests {
         let mut picture = Framebuffer::new(70, 40, Channels::of(&[Channel::Distance]));
         picture.for_each_band(&OneThread, 40, &|band| band.distance.fill(5.0));
         let mut veil = Veil::default();
-        veil.fill(&picture, &OneThread);
+        veil.fill(&picture, &Control::simple()).unwrap();
         assert!(veil.hides([3.0, 3.0], [60.0, 30.0], 5.1));
         assert!(!veil.hides([3.0, 3.0], [60.0, 30.0], 4.9));
         picture.for_each_band(&OneThread, 40, &|band| band.distance[20 * 70 + 69] = f32::INFINITY);
-        veil.fill(&picture, &OneThread);
+        veil.fill(&picture, &Control::simple()).unwrap();
         assert!(!veil.hides([66.0, 10.0], [67.0, 15.0], 5.1), "the next tile is within the margin");
         assert!(veil.hides([3.0, 3.0], [40.0, 30.0], 5.1) && veil.hides([66.0, 3.0], [-9.0, -9.0], 5.1));
     }
