@@ -7,7 +7,7 @@ use eframe::egui::ColorImage;
 use polyptych::convert::Converter;
 use polyptych::framebuffer::{Channel, Channels, Framebuffer, Pixel};
 use polyptych::picture::displayed;
-use polyptych::seam::{Control, Prepared, Registry, RenderError, Renderer, Report};
+use polyptych::seam::{Prepared, Registry, RenderError, Renderer, Report};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -103,10 +103,7 @@ impl Easel {
     fn prepare(&mut self, order: &Order, stop: &AtomicBool) -> Result<Prepared, RenderError> {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
         let converter = &self.converter;
-        self.hands.lend(|threads| {
-            let control = Control::new(threads).cancelled_by(stop);
-            renderer.prepare(&order.scene, &order.need, converter, &control)
-        })
+        self.hands.lend(stop, |control| renderer.prepare(&order.scene, &order.need, converter, &control))
     }
 
     /// Draws a picture, and learns from it how long one takes.
@@ -120,8 +117,7 @@ impl Easel {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
         let pixels = f64::from(target.width()) * f64::from(target.height());
         let begin = Instant::now();
-        let report = self.hands.lend(|threads| {
-            let control = Control::new(threads).cancelled_by(stop);
+        let report = self.hands.lend(stop, |control| {
             let control = match tiles {
                 Some(tiles) => control.watched_by(tiles),
                 None => control,

@@ -9,6 +9,7 @@ mod crew;
 mod easel;
 mod order;
 mod tiles;
+mod turns;
 
 pub(crate) use crew::Crew;
 pub(crate) use order::{Order, Pace};
@@ -58,6 +59,7 @@ pub(crate) enum News {
 /// Draws on a thread of its own.
 pub(crate) struct Painter {
     desk: Arc<Desk>,
+    crew: Crew,
 }
 
 /// What the window and a painter share.
@@ -115,17 +117,18 @@ impl Painter {
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Self {
         let desk = Arc::new(Desk { state: Mutex::default(), ordered: Condvar::new(), wake: Box::new(wake) });
-        let shared = desk.clone();
+        let (shared, own) = (desk.clone(), crew.clone());
         std::thread::spawn(move || {
             // The threads that this one starts yield like it.
             yield_to_the_window();
-            let mut easel = Easel::new(registry, converter, crew.clone());
+            let number = own.join();
+            let mut easel = Easel::new(registry, converter, own.clone());
             while let Some((order, stop)) = shared.next() {
-                let _at_work = crew.work();
+                let _at_work = own.work(number);
                 easel.paint(&order, &stop, &shared);
             }
         });
-        Self { desk }
+        Self { desk, crew }
     }
 
     /// Orders a picture in place of what was ordered before.
@@ -135,7 +138,9 @@ impl Painter {
             running.give_way(&order);
         }
         state.order = Some(order);
+        drop(state);
         self.desk.ordered.notify_one();
+        self.crew.look();
     }
 
     /// Stops what is being drawn and forgets what was ordered.
@@ -145,6 +150,8 @@ impl Painter {
         if let Some(running) = &mut state.running {
             running.stop();
         }
+        drop(state);
+        self.crew.look();
     }
 
     /// Takes what is new to see.
@@ -233,7 +240,8 @@ impl Desk {
     /// Shows what is new; what belongs to a stopped order is of no use any more.
     fn tell(&self, stop: &AtomicBool, news: News) {
         if !stop.load(Ordering::Relaxed) {
-            self.lock().news = Some(news);
+            // What nobody looked at is freed when the window need not wait for it.
+            let _unseen = self.lock().news.replace(news);
             (self.wake)();
         }
     }

@@ -1,0 +1,194 @@
+//! Whose turn is it? Where painters have more threads than the machine has cores, each works for a while and then lets
+//! another one go on, whenever it asks whether to stop.
+//!
+//! The system would let them take turns, too, but a thread that it holds up learns milliseconds late that it is to
+//! stop. One that waits here learns it at once.
+
+use polyptych::seam::Probe;
+use std::cell::Cell;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::Thread;
+use std::time::{Duration, Instant};
+
+/// A turn that others wait for lasts no longer.
+const TURN: Duration = Duration::from_millis(3);
+/// Who has waited for so long goes on: those whose turn it is may themselves wait for what it is making.
+const LONGEST_WAIT: Duration = Duration::from_millis(12);
+
+thread_local! {
+    /// When the turn of a thread began.
+    static SINCE: Cell<Option<Instant>> = const { Cell::new(None) };
+}
+
+/// The turns of all threads that draw.
+#[derive(Debug)]
+pub(super) struct Turns {
+    /// Threads that may work at once.
+    places: isize,
+    line: Mutex<Line>,
+    /// Whether threads wait, or are to wait.
+    is_crowded: AtomicBool,
+}
+
+#[derive(Debug, Default)]
+struct Line {
+    /// Below zero while threads wait that a plugin started by itself.
+    working: isize,
+    /// Those who wait, the next one first.
+    waiting: VecDeque<Thread>,
+}
+
+impl Turns {
+    pub(super) fn new(places: usize) -> Self {
+        Self { places: places.cast_signed(), line: Mutex::default(), is_crowded: AtomicBool::new(false) }
+    }
+
+    /// Takes places for threads, more than there are if need be, until what is returned is dropped.
+    pub(super) fn take(self: &Arc<Self>, count: usize) -> Taken {
+        self.change(|line| line.working += count.cast_signed());
+        Taken { turns: self.clone(), count }
+    }
+
+    /// Has those who wait look whether they are to stop.
+    pub(super) fn look(&self) {
+        let waiting = self.lock().waiting.clone();
+        waiting.iter().for_each(Thread::unpark);
+    }
+
+    /// Lets others go on if the calling thread has worked for its turn, and waits for the next one, or for a stop.
+    fn pass(&self, stop: &AtomicBool) {
+        let is_over = || SINCE.get().is_none_or(|since| since.elapsed() >= TURN);
+        if !self.is_crowded.load(Ordering::Relaxed) || !is_over() {
+            return;
+        }
+        let (own, until) = (std::thread::current(), Instant::now() + LONGEST_WAIT);
+        self.change(|line| {
+            line.waiting.push_back(own.clone());
+            line.working -= 1;
+        });
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            if self.is_next(&own) || left.is_zero() || stop.load(Ordering::Relaxed) {
+                break;
+            }
+            std::thread::park_timeout(left);
+        }
+        self.change(|line| {
+            line.waiting.retain(|thread| thread.id() != own.id());
+            line.working += 1;
+        });
+        SINCE.set(Some(Instant::now()));
+    }
+
+    /// Tells whether it is a waiting thread's turn.
+    fn is_next(&self, thread: &Thread) -> bool {
+        let line = self.lock();
+        line.working < self.places && line.waiting.front().is_some_and(|next| next.id() == thread.id())
+    }
+
+    /// Changes the line, notes how crowded it is then, and wakes the next one if there is a place.
+    fn change(&self, change: impl FnOnce(&mut Line)) {
+        let mut line = self.lock();
+        change(&mut line);
+        self.is_crowded.store(!line.waiting.is_empty() || line.working > self.places, Ordering::Relaxed);
+        let next = line.waiting.front().filter(|_| line.working < self.places).cloned();
+        // Whoever is woken is not to find it locked.
+        drop(line);
+        if let Some(next) = next {
+            next.unpark();
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Line> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Places of threads that work.
+pub(super) struct Taken {
+    turns: Arc<Turns>,
+    count: usize,
+}
+
+/// Lets threads that have a place take turns until they are to stop.
+#[derive(Clone, Copy)]
+pub(super) struct Turn<'a> {
+    pub(super) turns: &'a Turns,
+    pub(super) stop: &'a AtomicBool,
+}
+
+impl Probe for Turn<'_> {
+    fn stops(&self) -> bool {
+        self.turns.pass(self.stop);
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        self.turns.change(|line| line.working -= self.count.cast_signed());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicUsize;
+
+    #[test]
+    fn all_take_turns_on_one_place() {
+        let (turns, go_on) = (Arc::new(Turns::new(1)), AtomicBool::new(false));
+        let rounds: Vec<_> = (0..4).map(|_| AtomicUsize::new(0)).collect();
+        std::thread::scope(|scope| {
+            for own in &rounds {
+                scope.spawn(|| {
+                    let _place = turns.take(1);
+                    while rounds.iter().any(|rounds| rounds.load(Ordering::Relaxed) < 3) {
+                        assert!(!Turn { turns: &turns, stop: &go_on }.stops());
+                        own.fetch_add(1, Ordering::Relaxed);
+                        std::thread::sleep(TURN);
+                    }
+                });
+            }
+        });
+        let line = turns.lock();
+        assert_eq!((line.working, line.waiting.len()), (0, 0));
+        assert!(!turns.is_crowded.load(Ordering::Relaxed));
+    }
+
+    #[test]
+    fn nobody_waits_where_there_are_places() {
+        let (turns, stop) = (Arc::new(Turns::new(2)), AtomicBool::new(false));
+        let places = [turns.take(1), turns.take(1)];
+        assert!(!turns.is_crowded.load(Ordering::Relaxed));
+        let _third = turns.take(1);
+        assert!(turns.is_crowded.load(Ordering::Relaxed));
+        drop(places);
+        assert!(!turns.is_crowded.load(Ordering::Relaxed) && !Turn { turns: &turns, stop: &stop }.stops());
+    }
+
+    #[test]
+    fn waiting_ends_by_itself_or_by_a_stop() {
+        let (turns, [stop, has_waited]) = (Arc::new(Turns::new(1)), [false; 2].map(AtomicBool::new));
+        let _busy = turns.take(1);
+        std::thread::scope(|scope| {
+            let waits = scope.spawn(|| {
+                let _place = turns.take(1);
+                let turn = Turn { turns: &turns, stop: &stop };
+                let goes_on = !turn.stops();
+                has_waited.store(true, Ordering::Relaxed);
+                while !turn.stops() {}
+                goes_on
+            });
+            while !has_waited.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            stop.store(true, Ordering::Relaxed);
+            turns.look();
+            assert!(waits.join().unwrap());
+        });
+        assert_eq!(turns.lock().working, 1);
+    }
+}
