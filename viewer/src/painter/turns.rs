@@ -59,8 +59,12 @@ impl Turns {
 
     /// Lets others go on if the calling thread has worked for its turn, and waits for the next one, or for a stop.
     fn pass(&self, stop: &AtomicBool) {
-        let is_over = || SINCE.get().is_none_or(|since| since.elapsed() >= TURN);
-        if !self.is_crowded.load(Ordering::Relaxed) || !is_over() {
+        if !self.is_crowded.load(Ordering::Relaxed) {
+            return;
+        }
+        if SINCE.get().is_some_and(|since| since.elapsed() < TURN) {
+            // One that was woken, to stop or to show what is there, may have been given this one's core, and wait.
+            std::thread::yield_now();
             return;
         }
         let (own, until) = (std::thread::current(), Instant::now() + LONGEST_WAIT);
