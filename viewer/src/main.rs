@@ -47,7 +47,7 @@ impl Arguments {
 fn main() -> ExitCode {
     // A plugin's own process is this program, called anew.
     plugins::serve();
-    leave_cores_to_painters();
+    start_with_settings();
     let Some(arguments) = Arguments::read(std::env::args().skip(1)) else {
         eprintln!("usage: {USAGE}");
         return ExitCode::from(WRONG_USE);
@@ -61,24 +61,29 @@ fn main() -> ExitCode {
     }
 }
 
-/// Starts anew with few threads for an OpenGL that is drawn in software (Mesa's llvmpipe), unless somebody chose a
-/// number: it takes all cores that it finds from those who draw the pictures, to show them hardly sooner.
+/// Starts anew with what libraries read from the environment before `main`, unless somebody chose a value.
 #[cfg(target_os = "linux")]
-fn leave_cores_to_painters() {
+fn start_with_settings() {
     use std::os::unix::process::CommandExt;
-    const THREADS: &str = "LP_NUM_THREADS";
-    if let (None, Ok(own)) = (std::env::var_os(THREADS), std::env::current_exe()) {
-        let count = std::thread::available_parallelism().map_or(1, usize::from) / 4;
+    // An OpenGL that is drawn in software (Mesa's llvmpipe) takes all cores that it finds from those who draw the
+    // pictures, to show them hardly sooner.
+    let threads = std::thread::available_parallelism().map_or(1, usize::from) / 4;
+    // glibc gives freed pictures back to the system only while they are larger than the largest ever freed; else each
+    // thread that drew one keeps as much for good, and memory grows with every back end that is switched to.
+    let mapped = 1_usize << 18;
+    let missing: Vec<_> = [("LP_NUM_THREADS", threads), ("MALLOC_MMAP_THRESHOLD_", mapped)]
+        .into_iter()
+        .filter(|(name, _)| std::env::var_os(name).is_none())
+        .map(|(name, value)| (name, value.to_string()))
+        .collect();
+    if let (false, Ok(own)) = (missing.is_empty(), std::env::current_exe()) {
         // Whatever keeps it from starting anew, it goes on as it is.
-        let _ = std::process::Command::new(own)
-            .args(std::env::args_os().skip(1))
-            .env(THREADS, count.to_string())
-            .exec();
+        let _ = std::process::Command::new(own).args(std::env::args_os().skip(1)).envs(missing).exec();
     }
 }
 
 #[cfg(not(target_os = "linux"))]
-fn leave_cores_to_painters() {}
+fn start_with_settings() {}
 
 fn run(arguments: &Arguments) -> Result<(), (u8, String)> {
     if let Some(folder) = arguments.plugin_folders.iter().find(|folder| !folder.is_dir()) {

@@ -20,8 +20,9 @@ pub trait Watcher: Sync {
     fn finished(&self, band: &Band<'_>);
 }
 
-/// Is told whenever the work asks whether to go on, and may stop it: at the k-th time, to test what is left behind, or
-/// never, to measure how far apart the times are.
+/// Is told whenever the work asks whether to go on, and may stop it, or have it wait: a host lets painters take turns on
+/// its cores, a test stops at the k-th time, to see what is left behind, and a measurement notes how far apart the times
+/// are.
 pub trait Probe: Sync {
     /// Called on the thread that asks. Once true, it must stay so.
     fn stops(&self) -> bool;
@@ -75,7 +76,8 @@ impl<'a> Control<'a> {
         self
     }
 
-    /// Tells whether the host wants to stop. Once true, it stays so until the work is given up. To be asked once a tile or a millisecond.
+    /// Tells whether the host wants to stop. Once true, it stays so until the work is given up. To be asked once a tile
+    /// or a millisecond.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) || self.probe.is_some_and(Probe::stops)

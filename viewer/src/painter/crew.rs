@@ -94,13 +94,13 @@ impl Hands {
         Self { crew, pools: BTreeMap::new() }
     }
 
-    /// Does some work, until it is to stop, with as many threads as are due now. Where the system gives none, one is
-    /// enough.
+    /// Does some work, until it is to stop, with as many threads as are due now, and tells how long that took, the
+    /// others' turns not counted. Where the system gives no threads, one is enough.
     pub(super) fn lend<R: Send>(
         &mut self,
         stop: &AtomicBool,
         work: impl FnOnce(Control<'_>) -> R + Send,
-    ) -> R {
+    ) -> (R, Duration) {
         let count = self.crew.share();
         if count > 1 && !self.pools.contains_key(&count) {
             Pool::new(count).into_iter().for_each(|pool| drop(self.pools.insert(count, pool)));
@@ -108,14 +108,17 @@ impl Hands {
         let pool = self.pools.get(&count);
         let turns = &self.crew.turns;
         let _others = pool.map(|_| turns.take(count - 1));
-        let turn = Turn { turns, stop };
+        let turn = Turn::new(turns, stop);
+        let begin = Instant::now();
         // Where others are at work, it begins by waiting for its turn.
         turn.stops();
         let control = |threads| Control::new(threads).cancelled_by(stop).probed_by(&turn);
-        match pool {
+        let result = match pool {
             Some(pool) => pool.install(|| work(control(pool))),
             None => work(control(&OneThread)),
-        }
+        };
+        let waited = turn.waited() / pool.map_or(1, |_| count as u32);
+        (result, begin.elapsed().saturating_sub(waited))
     }
 }
 
@@ -131,7 +134,7 @@ mod tests {
         assert_eq!(crew.share(), 8);
         let others = [crew.work(two), crew.work(three)];
         assert_eq!(crew.share(), 4);
-        assert_eq!(Hands::of(crew.clone()).lend(&stop, |control| control.threads.count()), 4);
+        assert_eq!(Hands::of(crew.clone()).lend(&stop, |control| control.threads.count()).0, 4);
         let working = Instant::now();
         drop(others);
         while crew.share() < 8 {
@@ -140,6 +143,16 @@ mod tests {
         assert!(working.elapsed() >= MOMENT, "they are counted for a moment");
         drop((crew.work(two), first));
         assert_eq!(crew.lock().ends.len(), 2, "nobody is counted twice");
-        assert_eq!(Hands::of(Crew::of(1)).lend(&stop, |control| control.threads.count()), 1);
+        assert_eq!(Hands::of(Crew::of(1)).lend(&stop, |control| control.threads.count()).0, 1);
+    }
+
+    #[test]
+    fn a_time_is_without_the_turns_of_others() {
+        let (crew, stop) = (Crew::of(1), AtomicBool::new(false));
+        let _others = [crew.join(), crew.join()].map(|number| crew.work(number));
+        let begin = Instant::now();
+        let ((), time) = Hands::of(crew).lend(&stop, |control| assert!(!control.is_cancelled()));
+        // Nobody gives a place back, so that it waits for as long as anybody does.
+        assert!(time < begin.elapsed() && begin.elapsed() - time >= Duration::from_millis(12));
     }
 }

@@ -11,7 +11,7 @@ use polyptych::seam::{Prepared, Registry, RenderError, Renderer, Report};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Most pixels of the window for one that is drawn, along an edge.
 const COARSEST: u32 = 8;
@@ -51,10 +51,8 @@ impl Easel {
                 self.registry.create(&order.backend).map_err(|e| RenderError::Failed(e.to_string()))?;
             (self.renderer, self.cost) = (Some((order.backend.clone(), renderer)), None);
         }
-        let begin = Instant::now();
-        let prepared = self.prepare(order, stop)?;
+        let (prepared, prepare) = self.prepare(order, stop)?;
         desk.is_prepared();
-        let prepare = begin.elapsed();
         let mut coarse = coarseness(self.expected(order), order.pace);
         let mut before: Option<Arc<ColorImage>> = None;
         loop {
@@ -100,10 +98,13 @@ impl Easel {
         }
     }
 
-    fn prepare(&mut self, order: &Order, stop: &AtomicBool) -> Result<Prepared, RenderError> {
+    fn prepare(&mut self, order: &Order, stop: &AtomicBool) -> Result<(Prepared, Duration), RenderError> {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
         let converter = &self.converter;
-        self.hands.lend(stop, |control| renderer.prepare(&order.scene, &order.need, converter, &control))
+        let (prepared, time) = self
+            .hands
+            .lend(stop, |control| renderer.prepare(&order.scene, &order.need, converter, &control));
+        Ok((prepared?, time))
     }
 
     /// Draws a picture, and learns from it how long one takes.
@@ -116,15 +117,14 @@ impl Easel {
     ) -> Result<(Report, Duration), RenderError> {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
         let pixels = f64::from(target.width()) * f64::from(target.height());
-        let begin = Instant::now();
-        let report = self.hands.lend(stop, |control| {
+        let (report, frame) = self.hands.lend(stop, |control| {
             let control = match tiles {
                 Some(tiles) => control.watched_by(tiles),
                 None => control,
             };
             renderer.render(&order.need.frame(), target, &control)
-        })?;
-        let frame = begin.elapsed();
+        });
+        let report = report?;
         self.cost = Some(frame.as_secs_f64() / pixels.max(1.0));
         Ok((report, frame))
     }

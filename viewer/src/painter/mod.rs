@@ -38,6 +38,7 @@ pub(crate) struct Painting {
     pub(crate) framebuffer: Arc<Framebuffer>,
     /// Whether nothing finer follows.
     pub(crate) is_full: bool,
+    /// How long it was prepared and drawn, the turns of other painters not counted.
     pub(crate) prepare: Duration,
     pub(crate) frame: Duration,
     /// Pixels of the window for each pixel that was drawn, along an edge.
@@ -91,8 +92,9 @@ struct Running {
 }
 
 impl Running {
-    /// Stops the work, unless its coarse picture is about to be done, or what is being prepared serves the next order.
-    fn give_way(&mut self, next: &Order) {
+    /// Stops the work, unless its coarse picture is about to be done, or what is being prepared serves the next order;
+    /// tells whether it did.
+    fn give_way(&mut self, next: &Order) -> bool {
         let goes_on = match &self.preparing {
             Some(order) => order.is_but_for_camera(next),
             None => self.is_coarse && self.begun.elapsed() < PATIENCE,
@@ -100,6 +102,7 @@ impl Running {
         if !goes_on {
             self.stop();
         }
+        !goes_on
     }
 
     fn stop(&mut self) {
@@ -134,13 +137,13 @@ impl Painter {
     /// Orders a picture in place of what was ordered before.
     pub(crate) fn order(&self, order: Order) {
         let mut state = self.desk.lock();
-        if let Some(running) = &mut state.running {
-            running.give_way(&order);
-        }
+        let stops = state.running.as_mut().is_some_and(|running| running.give_way(&order));
         state.order = Some(order);
         drop(state);
         self.desk.ordered.notify_one();
-        self.crew.look();
+        if stops {
+            self.crew.look();
+        }
     }
 
     /// Stops what is being drawn and forgets what was ordered.
@@ -283,7 +286,7 @@ mod tests {
             let stop = Arc::new(AtomicBool::new(false));
             let begun = Instant::now();
             let mut running = Running { stop: stop.clone(), begun, is_coarse, preparing, stopped: None };
-            running.give_way(next);
+            assert_eq!(running.give_way(next), stop.load(Ordering::Relaxed));
             stop.load(Ordering::Relaxed)
         };
         assert!(!is_stopped_by(Some(first.clone()), true, &moved));

@@ -7,19 +7,21 @@
 use polyptych::seam::Probe;
 use std::cell::Cell;
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
 /// A turn that others wait for lasts no longer.
 const TURN: Duration = Duration::from_millis(3);
+/// Within its turn, a thread offers its core no more often to whoever was woken on it.
+const OFFER: Duration = Duration::from_micros(250);
 /// Who has waited for so long goes on: those whose turn it is may themselves wait for what it is making.
 const LONGEST_WAIT: Duration = Duration::from_millis(12);
 
 thread_local! {
-    /// When the turn of a thread began.
-    static SINCE: Cell<Option<Instant>> = const { Cell::new(None) };
+    /// When the turn of a thread began, and when it last offered its core.
+    static SINCE: Cell<Option<[Instant; 2]>> = const { Cell::new(None) };
 }
 
 /// The turns of all threads that draw.
@@ -57,17 +59,22 @@ impl Turns {
         waiting.iter().for_each(Thread::unpark);
     }
 
-    /// Lets others go on if the calling thread has worked for its turn, and waits for the next one, or for a stop.
-    fn pass(&self, stop: &AtomicBool) {
+    /// Lets others go on if the calling thread has worked for its turn, and waits for the next one, or for a stop;
+    /// returns how long it waited.
+    fn pass(&self, stop: &AtomicBool) -> Duration {
         if !self.is_crowded.load(Ordering::Relaxed) {
-            return;
+            return Duration::ZERO;
         }
-        if SINCE.get().is_some_and(|since| since.elapsed() < TURN) {
-            // One that was woken, to stop or to show what is there, may have been given this one's core, and wait.
-            std::thread::yield_now();
-            return;
+        let now = Instant::now();
+        if let Some([since, offered]) = SINCE.get().filter(|[since, _]| now - *since < TURN) {
+            if now - offered > OFFER {
+                // One that was woken, to stop or to show what is there, may have been given this one's core, and wait.
+                std::thread::yield_now();
+                SINCE.set(Some([since, Instant::now()]));
+            }
+            return Duration::ZERO;
         }
-        let (own, until) = (std::thread::current(), Instant::now() + LONGEST_WAIT);
+        let (own, until) = (std::thread::current(), now + LONGEST_WAIT);
         self.change(|line| {
             line.waiting.push_back(own.clone());
             line.working -= 1;
@@ -83,7 +90,9 @@ impl Turns {
             line.waiting.retain(|thread| thread.id() != own.id());
             line.working += 1;
         });
-        SINCE.set(Some(Instant::now()));
+        let begin = Instant::now();
+        SINCE.set(Some([begin; 2]));
+        begin - now
     }
 
     /// Tells whether it is a waiting thread's turn.
@@ -117,15 +126,30 @@ pub(super) struct Taken {
 }
 
 /// Lets threads that have a place take turns until they are to stop.
-#[derive(Clone, Copy)]
 pub(super) struct Turn<'a> {
-    pub(super) turns: &'a Turns,
-    pub(super) stop: &'a AtomicBool,
+    turns: &'a Turns,
+    stop: &'a AtomicBool,
+    /// Nanoseconds that its threads have waited, all together.
+    waited: AtomicU64,
+}
+
+impl<'a> Turn<'a> {
+    pub(super) fn new(turns: &'a Turns, stop: &'a AtomicBool) -> Self {
+        Self { turns, stop, waited: AtomicU64::new(0) }
+    }
+
+    /// Returns how long its threads have waited, all together.
+    pub(super) fn waited(&self) -> Duration {
+        Duration::from_nanos(self.waited.load(Ordering::Relaxed))
+    }
 }
 
 impl Probe for Turn<'_> {
     fn stops(&self) -> bool {
-        self.turns.pass(self.stop);
+        let waited = self.turns.pass(self.stop);
+        if !waited.is_zero() {
+            self.waited.fetch_add(waited.as_nanos() as u64, Ordering::Relaxed);
+        }
         self.stop.load(Ordering::Relaxed)
     }
 }
@@ -145,21 +169,56 @@ mod tests {
     fn all_take_turns_on_one_place() {
         let (turns, go_on) = (Arc::new(Turns::new(1)), AtomicBool::new(false));
         let rounds: Vec<_> = (0..4).map(|_| AtomicUsize::new(0)).collect();
+        let waited = AtomicUsize::new(0);
         std::thread::scope(|scope| {
             for own in &rounds {
                 scope.spawn(|| {
                     let _place = turns.take(1);
+                    let turn = Turn::new(&turns, &go_on);
                     while rounds.iter().any(|rounds| rounds.load(Ordering::Relaxed) < 3) {
-                        assert!(!Turn { turns: &turns, stop: &go_on }.stops());
+                        assert!(!turn.stops());
                         own.fetch_add(1, Ordering::Relaxed);
                         std::thread::sleep(TURN);
                     }
+                    waited.fetch_add(usize::from(!turn.waited().is_zero()), Ordering::Relaxed);
                 });
             }
         });
+        // Who is the last to begin may find the others done.
+        assert!(waited.into_inner() >= 3, "four have one place: each waits while others work");
         let line = turns.lock();
         assert_eq!((line.working, line.waiting.len()), (0, 0));
         assert!(!turns.is_crowded.load(Ordering::Relaxed));
+    }
+
+    #[test]
+    fn who_waits_goes_on_as_soon_as_there_is_a_place() {
+        let (turns, go_on) = (Arc::new(Turns::new(1)), AtomicBool::new(false));
+        let busy = turns.take(1);
+        let own = turns.take(1);
+        assert!(turns.is_crowded.load(Ordering::Relaxed));
+        let waited = std::thread::scope(|scope| {
+            let waits = scope.spawn(|| {
+                let turn = Turn::new(&turns, &go_on);
+                assert!(!turn.stops());
+                let first = turn.waited();
+                // Within its turn it need not wait, whoever else wants to work.
+                let _others = turns.take(8);
+                assert!(!turn.stops());
+                (first, turn.waited(), SINCE.get())
+            });
+            while turns.lock().waiting.is_empty() {
+                std::thread::yield_now();
+            }
+            assert_eq!(turns.lock().working, 1, "its place is another's");
+            drop(busy);
+            waits.join().unwrap()
+        });
+        assert!(!waited.0.is_zero() && waited.2.is_some());
+        // Unless this machine kept the thread from its core for a whole turn.
+        assert!(waited.1 == waited.0 || waited.1 - waited.0 > TURN);
+        drop(own);
+        assert_eq!(turns.lock().working, 0);
     }
 
     #[test]
@@ -167,10 +226,11 @@ mod tests {
         let (turns, stop) = (Arc::new(Turns::new(2)), AtomicBool::new(false));
         let places = [turns.take(1), turns.take(1)];
         assert!(!turns.is_crowded.load(Ordering::Relaxed));
-        let _third = turns.take(1);
+        let third = turns.take(1);
         assert!(turns.is_crowded.load(Ordering::Relaxed));
-        drop(places);
-        assert!(!turns.is_crowded.load(Ordering::Relaxed) && !Turn { turns: &turns, stop: &stop }.stops());
+        drop((places, third));
+        let turn = Turn::new(&turns, &stop);
+        assert!(!turns.is_crowded.load(Ordering::Relaxed) && !turn.stops() && turn.waited().is_zero());
     }
 
     #[test]
@@ -180,8 +240,9 @@ mod tests {
         std::thread::scope(|scope| {
             let waits = scope.spawn(|| {
                 let _place = turns.take(1);
-                let turn = Turn { turns: &turns, stop: &stop };
-                let goes_on = !turn.stops();
+                let turn = Turn::new(&turns, &stop);
+                // The only place is never given back: it goes on all the same.
+                let goes_on = !turn.stops() && turn.waited() >= LONGEST_WAIT;
                 has_waited.store(true, Ordering::Relaxed);
                 while !turn.stops() {}
                 goes_on
