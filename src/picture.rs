@@ -1,7 +1,7 @@
 //! How does a channel look, and how is it written to a file?
 
 use crate::framebuffer::{Channel, Framebuffer};
-use crate::shade::srgb_from_linear;
+use crate::pixels::srgb_bytes;
 use glam::Vec3;
 use std::fs;
 use std::io;
@@ -26,7 +26,7 @@ pub enum PictureError {
 #[must_use]
 pub fn displayed(picture: &Framebuffer, channel: Channel) -> Vec<[u8; 3]> {
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
-    let encoded = |c: &Vec3| c.to_array().map(|v| byte(srgb_from_linear(v)));
+    let encoded = |&color: &Vec3| srgb_bytes(color);
     match channel {
         Channel::Color => picture.color().iter().map(encoded).collect(),
         Channel::Albedo => picture.albedo().iter().map(encoded).collect(),

@@ -4,8 +4,8 @@
 //! loader takes back. Coordinates are bytes, so a grid longer than 256 cells becomes several models. One grid in its
 //! own space is written as a bare model; more, or moved ones, are placed by a scene graph, with invisible objects hidden.
 
+use crate::pixels::srgb_bytes;
 use crate::scene::{Material, Object, Scene, Shape, Voxels};
-use crate::shade::srgb_from_linear;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -241,7 +241,7 @@ fn color(material: &Material) -> [u8; 4] {
     } else {
         material.base_color
     };
-    let [r, g, b] = shown.to_array().map(|c| (srgb_from_linear(c).clamp(0.0, 1.0) * 255.0).round() as u8);
+    let [r, g, b] = srgb_bytes(shown);
     [r, g, b, 255]
 }
 

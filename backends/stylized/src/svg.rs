@@ -2,8 +2,8 @@
 
 use crate::stroke::{Kind, Stroke};
 use crate::style::Styles;
+use polyptych_core::pixels::srgb_bytes;
 use polyptych_core::scene::Scene;
-use polyptych_core::shade::srgb_from_linear;
 use std::collections::HashMap;
 use std::fmt::Write;
 
@@ -88,7 +88,7 @@ fn word(kind: Kind) -> &'static str {
 }
 
 fn hex(color: glam::Vec3) -> String {
-    let [r, g, b] = color.to_array().map(|c| (srgb_from_linear(c.clamp(0.0, 1.0)) * 255.0).round() as u8);
+    let [r, g, b] = srgb_bytes(color);
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 

@@ -161,7 +161,8 @@ impl Material {
 
 /// Reads and writes colors as `"#rrggbb"` (sRGB) or three linear numbers.
 pub mod color_text {
-    use crate::shade::{linear_from_srgb, srgb_from_linear};
+    use crate::pixels::srgb_bytes;
+    use crate::shade::linear_from_srgb;
     use glam::Vec3;
     use schemars::JsonSchema;
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
@@ -201,8 +202,8 @@ pub mod color_text {
     /// # Errors
     /// Those of the serializer.
     pub fn serialize<S: Serializer>(color: &Vec3, serializer: S) -> Result<S::Ok, S::Error> {
-        let byte = color.to_array().map(|c| (srgb_from_linear(c.clamp(0.0, 1.0)) * 255.0).round() as u32);
-        let hex = format!("#{:02x}{:02x}{:02x}", byte[0], byte[1], byte[2]);
+        let [r, g, b] = srgb_bytes(*color);
+        let hex = format!("#{r:02x}{g:02x}{b:02x}");
         if parse_hex(&hex).is_ok_and(|c| c == *color) {
             ColorText::Hex(hex).serialize(serializer)
         } else {

@@ -8,13 +8,16 @@ use polyptych::convert::Converter;
 use polyptych::framebuffer::{Channel, Channels, Framebuffer, Pixel};
 use polyptych::picture::displayed;
 use polyptych::seam::{Prepared, Registry, RenderError, Renderer, Report};
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Most pixels of the window for one that is drawn, along an edge.
 const COARSEST: u32 = 8;
+/// Pictures that are kept to be drawn over: the one that is shown, the one before it, and a coarse one.
+const KEPT: usize = 3;
 /// A picture that is expected to take longer is shown in parts.
 const SHOWN_IN_PARTS: Duration = Duration::from_millis(120);
 
@@ -24,13 +27,25 @@ pub(super) struct Easel {
     hands: Hands,
     converter: Arc<Converter>,
     renderer: Option<(String, Box<dyn Renderer>)>,
-    /// Seconds a pixel of the last frame.
-    cost: Option<f64>,
+    cost: Option<Cost>,
+    /// The pictures drawn last: over those that nobody looks at any more the next ones are drawn. New ones would be
+    /// megabytes that the system has to clear first, a page at a time.
+    drawn: VecDeque<Arc<Framebuffer>>,
+}
+
+/// Seconds a pixel of the last frame.
+#[derive(Clone, Copy)]
+struct Cost {
+    /// From its beginning to its end.
+    wall: f64,
+    /// Without the turns of others.
+    worked: f64,
 }
 
 impl Easel {
     pub(super) fn new(registry: Registry, converter: Arc<Converter>, crew: Crew) -> Self {
-        Self { registry, hands: Hands::of(crew), converter, renderer: None, cost: None }
+        let hands = Hands::of(crew);
+        Self { registry, hands, converter, renderer: None, cost: None, drawn: VecDeque::new() }
     }
 
     /// Draws an order. A renderer that fails or panics is thrown away.
@@ -66,8 +81,11 @@ impl Easel {
                 .filter(|_| is_slow && !is_draft && order.channel == Channel::Color)
                 .map(|coarse| Tiles::over(&coarse, size.map(|edge| edge as usize), desk, stop));
             let channels = if is_draft { Channels::of(&[order.channel]) } else { order.need.channels };
-            let mut target = Framebuffer::new(size[0], size[1], channels);
-            let (report, frame) = self.render(order, &mut target, tiles.as_ref(), stop)?;
+            let mut target = self.canvas(size, channels);
+            let drawn = self.render(order, &mut target, tiles.as_ref(), stop);
+            let target = Arc::new(target);
+            self.keep(target.clone());
+            let (report, frame) = drawn?;
             let finer = match order.pace {
                 Pace::Full => 1,
                 Pace::Within(_) => coarseness(self.expected(order), order.pace),
@@ -82,7 +100,7 @@ impl Easel {
             let painting = Painting {
                 backend: order.backend.clone(),
                 image: image.clone(),
-                framebuffer: Arc::new(target),
+                framebuffer: target,
                 is_full,
                 prepare,
                 frame,
@@ -101,10 +119,27 @@ impl Easel {
     fn prepare(&mut self, order: &Order, stop: &AtomicBool) -> Result<(Prepared, Duration), RenderError> {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
         let converter = &self.converter;
-        let (prepared, time) = self
-            .hands
-            .lend(stop, |control| renderer.prepare(&order.scene, &order.need, converter, &control));
+        let (prepared, time) =
+            self.hands.lend(stop, |control| renderer.prepare(&order.scene, &order.need, converter, &control));
         Ok((prepared?, time))
+    }
+
+    /// Returns a picture to be drawn over.
+    fn canvas(&mut self, [width, height]: [u32; 2], channels: Channels) -> Framebuffer {
+        let is_free = |drawn: &Arc<Framebuffer>| {
+            Arc::strong_count(drawn) == 1
+                && (drawn.width(), drawn.height(), drawn.channels()) == (width, height, channels)
+        };
+        let free = self.drawn.iter().position(is_free).and_then(|at| self.drawn.remove(at));
+        free.and_then(Arc::into_inner).unwrap_or_else(|| Framebuffer::new(width, height, channels))
+    }
+
+    /// Keeps a picture to be drawn over when nobody looks at it any more.
+    fn keep(&mut self, drawn: Arc<Framebuffer>) {
+        self.drawn.push_back(drawn);
+        if self.drawn.len() > KEPT {
+            self.drawn.pop_front();
+        }
     }
 
     /// Draws a picture, and learns from it how long one takes.
@@ -117,6 +152,7 @@ impl Easel {
     ) -> Result<(Report, Duration), RenderError> {
         let Some((_, renderer)) = &mut self.renderer else { return Err(RenderError::NotPrepared) };
         let pixels = f64::from(target.width()) * f64::from(target.height());
+        let begin = Instant::now();
         let (report, frame) = self.hands.lend(stop, |control| {
             let control = match tiles {
                 Some(tiles) => control.watched_by(tiles),
@@ -125,14 +161,20 @@ impl Easel {
             renderer.render(&order.need.frame(), target, &control)
         });
         let report = report?;
-        self.cost = Some(frame.as_secs_f64() / pixels.max(1.0));
+        let [wall, worked] = [begin.elapsed(), frame].map(|time| time.as_secs_f64() / pixels.max(1.0));
+        self.cost = Some(Cost { wall, worked });
         Ok((report, frame))
     }
 
-    /// Returns how long the full picture is expected to take; nothing before the first one.
+    /// Returns how long the full picture is expected to take: with the turns of others where they hold up who looks at
+    /// it, without where back ends get the same time. Nothing before the first one.
     fn expected(&self, order: &Order) -> Option<Duration> {
         let pixels = f64::from(order.need.width) * f64::from(order.need.height);
-        self.cost.map(|cost| Duration::from_secs_f64(cost * pixels))
+        let share = self.cost.map(|cost| match order.pace {
+            Pace::Full => cost.wall,
+            Pace::Within(_) => cost.worked,
+        });
+        share.map(|cost| Duration::from_secs_f64(cost * pixels))
     }
 }
 
@@ -149,7 +191,7 @@ fn coarseness(expected: Option<Duration>, pace: Pace) -> u32 {
 }
 
 /// Draws a picture out to a larger size, so that it can be held against others of that size.
-fn stretched(picture: Framebuffer, width: u32, height: u32) -> Framebuffer {
+fn stretched(picture: Arc<Framebuffer>, width: u32, height: u32) -> Arc<Framebuffer> {
     let (w, h) = (picture.width(), picture.height());
     if (w, h) == (width, height) || w == 0 || h == 0 {
         return picture;
@@ -162,7 +204,7 @@ fn stretched(picture: Framebuffer, width: u32, height: u32) -> Framebuffer {
             band.put(x, y, &pixel(&picture, at));
         }
     }
-    large
+    Arc::new(large)
 }
 
 /// Returns what a pixel of a picture holds; what it does not hold is as in the background.
@@ -193,10 +235,27 @@ mod tests {
     }
 
     #[test]
+    fn pictures_that_nobody_looks_at_are_drawn_over() {
+        let mut easel = Easel::new(Registry::default(), Arc::new(Converter::default()), Crew::default());
+        let (size, channels) = ([4, 3], Channels::COLOR);
+        let shown = Arc::new(easel.canvas(size, channels));
+        let place = |picture: &Framebuffer| picture.color().as_ptr();
+        easel.keep(shown.clone());
+        let other = easel.canvas(size, channels);
+        assert_ne!(place(&other), place(&shown), "it is looked at");
+        let before = place(&shown);
+        drop(shown);
+        assert_eq!(easel.canvas([3, 4], channels).width(), 3);
+        assert_eq!(place(&easel.canvas(size, channels)), before);
+        (0..9).for_each(|edge| easel.keep(Arc::new(Framebuffer::new(edge, 1, channels))));
+        assert_eq!(easel.drawn.len(), KEPT);
+    }
+
+    #[test]
     fn enlarged_pictures_hold_the_same_values() {
         let mut small = Framebuffer::new(2, 1, Channels::ALL);
         small.band().put(1, 0, &Pixel { id: 7, distance: 2.0, ..Pixel::background(glam::Vec3::ONE) });
-        let large = stretched(small, 5, 3);
+        let large = stretched(Arc::new(small), 5, 3);
         assert_eq!((large.width(), large.height()), (5, 3));
         let ids: Vec<_> = large.id()[10..].to_vec();
         assert_eq!(ids, [0, 0, 0, 7, 7]);

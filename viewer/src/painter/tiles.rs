@@ -3,8 +3,8 @@
 use super::{Desk, News};
 use eframe::egui::{Color32, ColorImage};
 use polyptych::framebuffer::Band;
+use polyptych::pixels::srgb_bytes;
 use polyptych::seam::Watcher;
-use polyptych::shade::srgb_from_linear;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -30,9 +30,8 @@ impl<'a> Tiles<'a> {
 
 impl Watcher for Tiles<'_> {
     fn finished(&self, band: &Band<'_>) {
-        let byte = |v: f32| (srgb_from_linear(v).clamp(0.0, 1.0) * 255.0).round() as u8;
-        let pixels: Vec<_> =
-            band.color.iter().map(|c| Color32::from_rgb(byte(c.x), byte(c.y), byte(c.z))).collect();
+        let pixel = |[r, g, b]: [u8; 3]| Color32::from_rgb(r, g, b);
+        let pixels: Vec<_> = band.color.iter().map(|&color| pixel(srgb_bytes(color))).collect();
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         let (image, shown) = &mut *seen;
         let first = band.first_row as usize * band.width as usize;

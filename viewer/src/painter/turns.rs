@@ -14,14 +14,12 @@ use std::time::{Duration, Instant};
 
 /// A turn that others wait for lasts no longer.
 const TURN: Duration = Duration::from_millis(3);
-/// Within its turn, a thread offers its core no more often to whoever was woken on it.
-const OFFER: Duration = Duration::from_micros(250);
 /// Who has waited for so long goes on: those whose turn it is may themselves wait for what it is making.
 const LONGEST_WAIT: Duration = Duration::from_millis(12);
 
 thread_local! {
-    /// When the turn of a thread began, and when it last offered its core.
-    static SINCE: Cell<Option<[Instant; 2]>> = const { Cell::new(None) };
+    /// When the turn of a thread began.
+    static SINCE: Cell<Option<Instant>> = const { Cell::new(None) };
 }
 
 /// The turns of all threads that draw.
@@ -66,12 +64,9 @@ impl Turns {
             return Duration::ZERO;
         }
         let now = Instant::now();
-        if let Some([since, offered]) = SINCE.get().filter(|[since, _]| now - *since < TURN) {
-            if now - offered > OFFER {
-                // One that was woken, to stop or to show what is there, may have been given this one's core, and wait.
-                std::thread::yield_now();
-                SINCE.set(Some([since, Instant::now()]));
-            }
+        if SINCE.get().is_some_and(|since| now - since < TURN) {
+            // One that was woken, to stop or to show what is there, may have been given this one's core, and wait.
+            std::thread::yield_now();
             return Duration::ZERO;
         }
         let (own, until) = (std::thread::current(), now + LONGEST_WAIT);
@@ -91,7 +86,7 @@ impl Turns {
             line.working += 1;
         });
         let begin = Instant::now();
-        SINCE.set(Some([begin; 2]));
+        SINCE.set(Some(begin));
         begin - now
     }
 

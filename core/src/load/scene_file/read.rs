@@ -9,8 +9,8 @@ use crate::load::image::{Holds, TextureMaker, checker};
 use crate::load::limits::LoadOptions;
 use crate::load::source::Source;
 use crate::load::text::decode_text;
+use crate::pixels::srgb_bytes;
 use crate::scene::{NormalMap, Object, Scene, Texture};
-use crate::shade::srgb_from_linear;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::DAffine3;
@@ -320,7 +320,7 @@ fn check_material(entry: &MaterialEntry) -> Result<(), String> {
 
 fn generated_checker(name: &str, colors: [glam::Vec3; 2], cells: u32) -> Texture {
     let bytes = colors.map(|color| {
-        let [r, g, b] = color.to_array().map(|c| (srgb_from_linear(c.clamp(0.0, 1.0)) * 255.0).round() as u8);
+        let [r, g, b] = srgb_bytes(color);
         [r, g, b, 255]
     });
     checker(name, bytes, cells, CHECKER_PIXELS / cells * cells)

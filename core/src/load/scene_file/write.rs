@@ -5,8 +5,8 @@ use super::schema::{MaterialEntry, MaterialNames, NormalMapEntry, ObjectEntry, S
 use super::shape;
 use crate::load::error::one_line;
 use crate::load::image::Holds;
+use crate::pixels::srgb_bytes;
 use crate::scene::{Scene, Texture};
-use crate::shade::srgb_from_linear;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::{ImageFormat, RgbaImage};
@@ -157,10 +157,13 @@ fn png(texture: &Texture, holds: Holds) -> Result<String, String> {
     let [width, height] = texture.size();
     let picture = RgbaImage::from_fn(width, height, |x, y| {
         let uv = [(x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32];
-        let [r, g, b, a] = texture.sample(uv, 0.0).to_array();
+        let texel = texture.sample(uv, 0.0);
         let byte = |share: f32| (share * 255.0).round() as u8;
-        let color = |linear: f32| byte(if holds == Holds::Data { linear } else { srgb_from_linear(linear) });
-        image::Rgba([color(r), color(g), color(b), byte(a)])
+        let [r, g, b] = match holds {
+            Holds::Data => texel.truncate().to_array().map(byte),
+            _ => srgb_bytes(texel.truncate()),
+        };
+        image::Rgba([r, g, b, byte(texel.w)])
     });
     let mut bytes = Vec::new();
     picture.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).map_err(|error| error.to_string())?;
