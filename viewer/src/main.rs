@@ -70,7 +70,7 @@ fn start_with_settings() {
     let threads = std::thread::available_parallelism().map_or(1, usize::from) / 4;
     // glibc gives freed pictures back to the system only while they are larger than the largest ever freed; else each
     // thread that drew one keeps as much for good, and memory grows with every back end that is switched to.
-    let mapped = 1_usize << 18;
+    let mapped = 1_usize << 20;
     let missing: Vec<_> = [("LP_NUM_THREADS", threads), ("MALLOC_MMAP_THRESHOLD_", mapped)]
         .into_iter()
         .filter(|(name, _)| std::env::var_os(name).is_none())
