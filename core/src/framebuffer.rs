@@ -406,34 +406,43 @@ impl Framebuffer {
         }
     }
 
-    /// Draws the picture in bands of `rows` rows, in parallel; band borders lie at multiples of `rows`.
+    /// Draws the picture in bands of `rows` rows, in parallel; band borders lie at multiples of `rows`. From the middle
+    /// outward: what is looked at is mostly there, and threads are done together where the last bands are cheap ones.
     ///
     /// Allocates nothing. The result does not depend on the number of threads as long as `draw` writes only
     /// what follows from the band's place.
     pub fn for_each_band(&mut self, threads: &dyn Threads, rows: u32, draw: &(impl Fn(Band<'_>) + Sync)) {
-        fn halve(threads: &dyn Threads, band: Band<'_>, rows: u32, draw: &(impl Fn(Band<'_>) + Sync)) {
+        /// Rows of the upper half.
+        fn half_of(height: u32, rows: u32) -> u32 {
+            height.div_ceil(rows) / 2 * rows
+        }
+        fn halve(
+            threads: &dyn Threads,
+            band: Band<'_>,
+            rows: u32,
+            middle: u32,
+            draw: &(impl Fn(Band<'_>) + Sync),
+        ) {
             if band.rows <= rows {
                 draw(band);
                 return;
             }
-            let middle = band.rows.div_ceil(rows) / 2 * rows;
-            let (upper, lower) = band.split(middle);
-            let (mut upper, mut lower) = (Some(upper), Some(lower));
-            threads.join(
-                &mut || {
-                    if let Some(band) = upper.take() {
-                        halve(threads, band, rows, draw);
-                    }
-                },
-                &mut || {
-                    if let Some(band) = lower.take() {
-                        halve(threads, band, rows, draw);
-                    }
-                },
-            );
+            let is_upper = band.first_row < middle;
+            let half = half_of(band.rows, rows);
+            let (upper, lower) = band.split(half);
+            let (first, second) = if is_upper { (lower, upper) } else { (upper, lower) };
+            let (mut first, mut second) = (Some(first), Some(second));
+            let go_on = |band: &mut Option<Band<'_>>| {
+                if let Some(band) = band.take() {
+                    halve(threads, band, rows, middle, draw);
+                }
+            };
+            threads.join(&mut || go_on(&mut first), &mut || go_on(&mut second));
         }
         if self.width > 0 && self.height > 0 {
-            halve(threads, self.band(), rows.max(1), draw);
+            let rows = rows.max(1);
+            let middle = half_of(self.height, rows);
+            halve(threads, self.band(), rows, middle, draw);
         }
     }
 
@@ -566,6 +575,19 @@ impl<'a> Band<'a> {
 mod tests {
     use super::*;
     use crate::parallel::{OneThread, Pool};
+
+    #[test]
+    fn bands_are_drawn_from_the_middle_outward() {
+        for (height, first) in [(96, vec![3, 4, 5, 2, 1, 0]), (100, vec![3, 4, 5, 6, 2, 1, 0]), (16, vec![0])]
+        {
+            let drawn = std::sync::Mutex::new(Vec::new());
+            let mut picture = Framebuffer::new(1, height, Channels::COLOR);
+            picture.for_each_band(&crate::parallel::OneThread, 16, &|band| {
+                drawn.lock().unwrap().push(band.first_row / 16);
+            });
+            assert_eq!(drawn.into_inner().unwrap(), first, "{height}");
+        }
+    }
 
     #[test]
     fn bands_cover_every_row_once() {

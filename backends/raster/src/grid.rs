@@ -3,7 +3,7 @@
 /// Columns of a tile.
 pub(crate) const TILE_WIDTH: u32 = 64;
 /// Rows of a tile: those of a band, so that a band is a row of tiles.
-pub(crate) const TILE_HEIGHT: u32 = 32;
+pub(crate) const TILE_HEIGHT: u32 = 16;
 /// Pixels of a tile.
 pub(crate) const TILE_PIXELS: usize = (TILE_WIDTH * TILE_HEIGHT) as usize;
 

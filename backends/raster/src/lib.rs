@@ -10,7 +10,7 @@
 //!  clip       what reaches behind the eye or beyond the guard band
 //!  sieve      eight triangles at once: which of them cover no pixel
 //!  setup      corners snapped to 24.8 bits, exact edges, depth plane
-//!  bin        records sorted into tiles of 64x32 pixels
+//!  bin        records sorted into tiles of 64x16 pixels
 //!  grid       which tiles something touches
 //!  edges      which pixels of a tile a triangle covers
 //!  tile       the nearest triangle of each pixel: the visibility buffer

@@ -60,17 +60,20 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
+    /// Forgets what it holds; it has room for so many columns then.
     pub(crate) fn reserve(&mut self, width: usize) {
-        for row in self.right.iter_mut().chain([&mut self.down]) {
-            row.clear();
-            row.resize(width + 1, None);
-        }
-        // Which of the two is above changes from row to row, so neither may be too small for any.
-        for set in &mut self.set {
-            set.clear();
+        // What is set is known: most columns are as they should be.
+        for (set, right) in self.set.iter_mut().zip(&mut self.right) {
+            set.drain(..).for_each(|x| right[x as usize] = None);
+            right.resize(width + 1, None);
+            // Which of the two is above changes from row to row, so neither may be too small for any.
             set.reserve(width);
         }
-        self.touched.clear();
+        for x in self.touched.drain(..) {
+            self.down[x as usize] = None;
+            self.down[x as usize + 1] = None;
+        }
+        self.down.resize(width + 1, None);
         self.strokes.clear();
     }
 

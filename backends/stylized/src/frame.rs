@@ -98,13 +98,6 @@ impl Buffers {
         }
         let view = camera.view(visible.width(), visible.height());
         let straight = keeps_lines(&camera.projection);
-        if straight {
-            let sight = Sight { camera, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
-            outline.fill(&outlines.bodies, &sight, control)?;
-        } else {
-            outline.clear();
-        }
-        control.check()?;
         let surfaces = Surfaces {
             visible,
             spans,
@@ -115,10 +108,27 @@ impl Buffers {
             outlined: if straight { &outlines.outlined } else { without },
             colorful: &ready.colorful,
         };
-        control.for_each_mut(cracks, 1, &|band, scratch| {
-            let first = band as u32 * ROWS;
-            surfaces.find(first..first + ROWS, scratch);
-        })?;
+        // Both at the same time: neither is done evenly.
+        let mut edges = Ok(());
+        control.threads.join(
+            &mut || {
+                if straight {
+                    let sight = Sight { camera, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
+                    edges = outline.fill(&outlines.bodies, &sight, control);
+                } else {
+                    outline.clear();
+                }
+            },
+            &mut || {
+                // Whether it was stopped is asked below.
+                let _ = control.for_each_mut(cracks, 1, &|band, scratch| {
+                    let first = band as u32 * ROWS;
+                    surfaces.find(first..first + ROWS, scratch);
+                });
+            },
+        );
+        edges?;
+        control.check()?;
         for strokes in outline.strokes().chain(cracks.iter().map(|c| &c.strokes[..])) {
             lines.strokes.extend_from_slice(strokes);
         }

@@ -20,7 +20,7 @@ pub(crate) const ROWS: u32 = 32;
 /// Buffers of a band.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// Cosines to the light of the band's rows, and of one more on each side.
+    /// Cosines to the light of a row and of its neighbors: a row's are where its number divided by three leaves.
     facing: Vec<f32>,
     pub(crate) ink: Ink,
     /// Which stretches of its rows hold the background, and nothing else.
@@ -65,7 +65,9 @@ impl Painting<'_> {
         let columns = (width as usize).div_ceil(SPAN);
         grounded.resize(columns * band.rows as usize, false);
         let stride = width as usize + 2 * LANES;
-        facing.resize(stride * (ROWS as usize + 2), 0.0);
+        facing.resize(stride * 3, 0.0);
+        // From one row up on: the first of the picture has a neighbor, too.
+        let place = |row_below: u32| (row_below % 3) as usize * stride;
         let lines = self.styles.draw_lines();
         if lines {
             ink.clear(width, band.rows);
@@ -82,20 +84,21 @@ impl Painting<'_> {
             // No sooner than they are asked for: what they are reckoned from is read again when the row is painted, and
             // should still be near.
             while shades && next <= (y + around).min(height - 1) {
-                let begin = (next + 1 - first) as usize * stride;
+                let begin = place(next + 1);
                 self.face(next, &mut facing[begin..begin + stride]);
-                // Beyond the picture it goes on as it is.
-                if next == 0 {
-                    facing.copy_within(stride..2 * stride, 0);
-                }
-                if next + 1 == height {
-                    facing.copy_within(begin..begin + stride, begin + stride);
-                }
                 next += 1;
+            }
+            let [above, own, below] = [0, 1, 2].map(|row| place(y + row));
+            // Beyond the picture it goes on as it is.
+            if y == 0 {
+                facing.copy_within(own..own + stride, above);
+            }
+            if y + 1 == height {
+                facing.copy_within(own..own + stride, below);
             }
             let colors = &mut band.color[(row * width) as usize..((row + 1) * width) as usize];
             let grounded = &mut grounded[row as usize * columns..][..columns];
-            self.row(y, (row as usize + 1) * stride, stride, facing, grounded, colors);
+            self.row(y, [above, own, below], facing, grounded, colors);
             if lines {
                 ink.blend(row, self.styles, grounded, colors);
             }
@@ -181,17 +184,9 @@ impl Painting<'_> {
         all
     }
 
-    /// Paints a row without its lines. `own` is where its cosines begin.
+    /// Paints a row without its lines. `around` is where the cosines of the row above, its own, and those below begin.
     #[inline(always)]
-    fn row(
-        &self,
-        y: u32,
-        own: usize,
-        stride: usize,
-        facing: &[f32],
-        grounded: &mut [bool],
-        colors: &mut [Vec3],
-    ) {
+    fn row(&self, y: u32, around: [usize; 3], facing: &[f32], grounded: &mut [bool], colors: &mut [Vec3]) {
         let width = colors.len();
         let directions = self.view.row(y);
         let row = y as usize * width;
@@ -213,7 +208,7 @@ impl Painting<'_> {
                 if is_full || union::<LANES>(seen.ids) != 0 {
                     let (direction, origin) = self.rays(x, y, directions.as_ref());
                     let eight = Eight { x: x as u32, y, count, seen, direction };
-                    let around = [own + LANES + x, stride];
+                    let around = [0, 1, 2].map(|i: usize| around[i] + LANES + x);
                     self.paint(&eight, is_full, origin, around, facing, &mut colors[x..x + count]);
                 }
                 x += LANES;
@@ -228,7 +223,7 @@ impl Painting<'_> {
         eight: &Eight<'_>,
         is_full: bool,
         origin: Vec3x8,
-        around: [usize; 2],
+        around: [usize; 3],
         facing: &[f32],
         out: &mut [Vec3],
     ) {
@@ -275,7 +270,7 @@ impl Painting<'_> {
         style: &Style,
         eight: &Eight<'_>,
         origin: Vec3x8,
-        [at, stride]: [usize; 2],
+        [above, at, below]: [usize; 3],
         facing: &[f32],
     ) -> Vec3x8 {
         if style.show != Show::Style {
@@ -288,7 +283,7 @@ impl Painting<'_> {
         let slope = if style.tone.steps > 1 {
             // On the smooth side: next to another surface or a shadow the other difference says nothing.
             let across = steepness(cosine, facing, at - 1, at + 1);
-            let down = steepness(cosine, facing, at - stride, at + stride);
+            let down = steepness(cosine, facing, above, below);
             (across * across + down * down).sqrt()
         } else {
             F32x8::ZERO
