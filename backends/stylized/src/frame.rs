@@ -109,26 +109,24 @@ impl Buffers {
             colorful: &ready.colorful,
         };
         // Both at the same time: neither is done evenly.
-        let mut edges = Ok(());
+        let (mut from_edges, mut from_pixels) = (Ok(()), Ok(()));
         control.threads.join(
             &mut || {
                 if straight {
                     let sight = Sight { camera, visible, styles: &ready.styles, pixel: view.pixel_size(1.0) };
-                    edges = outline.fill(&outlines.bodies, &sight, control);
+                    from_edges = outline.fill(&outlines.bodies, &sight, control);
                 } else {
                     outline.clear();
                 }
             },
             &mut || {
-                // Whether it was stopped is asked below.
-                let _ = control.for_each_mut(cracks, 1, &|band, scratch| {
+                from_pixels = control.for_each_mut(cracks, 1, &|band, scratch| {
                     let first = band as u32 * ROWS;
                     surfaces.find(first..first + ROWS, scratch);
                 });
             },
         );
-        edges?;
-        control.check()?;
+        from_edges.and(from_pixels)?;
         for strokes in outline.strokes().chain(cracks.iter().map(|c| &c.strokes[..])) {
             lines.strokes.extend_from_slice(strokes);
         }

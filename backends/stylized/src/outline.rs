@@ -20,6 +20,8 @@ use std::sync::Arc;
 
 /// Edges looked at by one worker at a time: those that are long on the picture take a while.
 const PIECE: usize = 512;
+/// Faces looked at by one worker at a time.
+const FACES: usize = 1 << 14;
 /// What is nearer to the eye than this share of the body's distance is cut off.
 const NEAR: f64 = 1e-4;
 
@@ -137,7 +139,7 @@ fn turn(body: &Body, camera: &Camera, facing: &mut [bool], control: &Control<'_>
     };
     let eye = eye.as_vec3();
     let planes = &body.edges.planes;
-    control.for_each_mut(facing, PIECE * 32, &|i, turned| {
+    control.for_each_mut(facing, FACES, &|i, turned| {
         let [x, y, z, offset] = planes[i];
         *turned = x * eye.x + y * eye.y + z * eye.z > offset * weight;
     })

@@ -124,6 +124,7 @@ impl Hands {
 
 #[cfg(test)]
 mod tests {
+    use super::super::turns::LONGEST_WAIT;
     use super::*;
 
     #[test]
@@ -153,6 +154,6 @@ mod tests {
         let begin = Instant::now();
         let ((), time) = Hands::of(crew).lend(&stop, |control| assert!(!control.is_cancelled()));
         // Nobody gives a place back, so that it waits for as long as anybody does.
-        assert!(time < begin.elapsed() && begin.elapsed() - time >= Duration::from_millis(12));
+        assert!(time < begin.elapsed() && begin.elapsed() - time >= LONGEST_WAIT);
     }
 }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 /// A turn that others wait for lasts no longer.
 const TURN: Duration = Duration::from_millis(3);
 /// Who has waited for so long goes on: those whose turn it is may themselves wait for what it is making.
-const LONGEST_WAIT: Duration = Duration::from_millis(12);
+pub(super) const LONGEST_WAIT: Duration = Duration::from_millis(12);
 
 thread_local! {
     /// When the turn of a thread began.
@@ -202,10 +202,10 @@ mod tests {
                 assert!(!turn.stops());
                 (first, turn.waited(), SINCE.get())
             });
-            while turns.lock().waiting.is_empty() {
+            // One that waits longest before this thread gets a core is done already.
+            while turns.lock().waiting.is_empty() && !waits.is_finished() {
                 std::thread::yield_now();
             }
-            assert_eq!(turns.lock().working, 1, "its place is another's");
             drop(busy);
             waits.join().unwrap()
         });

@@ -159,10 +159,8 @@ fn png(texture: &Texture, holds: Holds) -> Result<String, String> {
         let uv = [(x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32];
         let texel = texture.sample(uv, 0.0);
         let byte = |share: f32| (share * 255.0).round() as u8;
-        let [r, g, b] = match holds {
-            Holds::Data => texel.truncate().to_array().map(byte),
-            _ => srgb_bytes(texel.truncate()),
-        };
+        let color = texel.truncate();
+        let [r, g, b] = if holds == Holds::Data { color.to_array().map(byte) } else { srgb_bytes(color) };
         image::Rgba([r, g, b, byte(texel.w)])
     });
     let mut bytes = Vec::new();
