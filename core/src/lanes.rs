@@ -347,6 +347,14 @@ impl I32x8 {
         Mask8::new(lanes!(0_u32, i => (a[i] >> 31) as u32))
     }
 
+    /// Tells which are neither negative nor as large as a length.
+    #[must_use]
+    #[inline(always)]
+    pub fn is_index_below(self, length: u32) -> Mask8 {
+        let a = self.0.values();
+        Mask8::new(lanes!(0_u32, i => if (a[i] as u32) < length { u32::MAX } else { 0 }))
+    }
+
     /// Turns them into numbers in double precision.
     #[must_use]
     #[inline(always)]

@@ -14,6 +14,22 @@ pub enum Registers {
     Avx512,
 }
 
+/// Asks for a value to be brought near, for it will be read soon; it is not waited for.
+#[inline(always)]
+pub fn fetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        #[expect(unsafe_code, reason = "the instruction takes a place by its address")]
+        // SAFETY: nothing is read or written, and every processor of this kind has the instruction.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast());
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}
+
 impl Registers {
     /// All, narrow ones first.
     pub const ALL: [Self; 3] = [Self::Plain, Self::Avx2, Self::Avx512];

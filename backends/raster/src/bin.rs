@@ -1,7 +1,7 @@
 //! Which triangles touch which tile of the picture?
 //!
-//! The triangles of a model are cut into a number of runs that depends on the model alone. Each run is set up
-//! and sorted into tiles by one thread, so bins hold the same records in the same order on any number of them.
+//! The triangles of a model are cut into runs. Each is set up and sorted into tiles by one thread, and a tile looks at
+//! them one after the other, so that it sees the same records in the same order on any number of threads.
 
 use crate::clip::clip;
 use crate::grid::{Placed, TileGrid};
@@ -11,11 +11,13 @@ use crate::setup::{Corners, DepthPlane, Record, STEPS};
 use crate::sieve;
 use crate::transform::{PartOnScreen, ScreenVertices, border};
 use polyptych_core::lanes::LANES;
+use polyptych_core::registers::fetch;
 use polyptych_core::seam::{Cancelled, Control};
 use std::ops::Range;
 
-/// Most runs: enough for a few times as many threads as there usually are.
-pub(crate) const RUNS: usize = 32;
+/// Runs for each thread: enough that none waits long for the others, and few, for the records of a tile lie in as many
+/// places.
+const RUNS: usize = 4;
 /// Triangles or lines that are worth a run of their own.
 const LEAST_IN_RUN: usize = 512;
 
@@ -58,8 +60,8 @@ pub(crate) struct Run {
 }
 
 /// Returns the number of runs for so many triangles or lines.
-pub(crate) fn runs_for(count: usize) -> usize {
-    count.div_ceil(LEAST_IN_RUN).clamp(1, RUNS)
+pub(crate) fn runs_for(count: usize, control: &Control<'_>) -> usize {
+    count.div_ceil(LEAST_IN_RUN).clamp(1, RUNS * control.threads.count())
 }
 
 /// Returns which of all are in a run.
@@ -69,7 +71,8 @@ pub(crate) fn run_of(count: usize, run: usize, runs: usize) -> Range<usize> {
 
 /// Records by tile, in the order in which they were added.
 pub(crate) struct Bin<T> {
-    blocks: Vec<[T; BLOCK]>,
+    /// In blocks of [`BLOCK`], those of a tile chained.
+    records: Vec<T>,
     /// For each block the next one of its tile.
     next: Vec<u32>,
     tiles: Vec<List>,
@@ -95,6 +98,8 @@ pub(crate) struct Records<'a, T> {
     bin: &'a Bin<T>,
     /// Those of the block at hand that are left.
     block: std::slice::Iter<'a, T>,
+    /// As many of the next block: each is brought near while one of this block is drawn.
+    ahead: std::slice::Iter<'a, T>,
     /// The blocks that are left.
     list: List,
 }
@@ -105,6 +110,9 @@ impl<'a, T> Iterator for Records<'a, T> {
     #[inline(always)]
     fn next(&mut self) -> Option<&'a T> {
         if let Some(record) = self.block.next() {
+            if let Some(ahead) = self.ahead.next() {
+                fetch(ahead);
+            }
             return Some(record);
         }
         let some = BLOCK.min(self.list.count as usize);
@@ -114,7 +122,10 @@ impl<'a, T> Iterator for Records<'a, T> {
         let block = self.list.first as usize;
         self.list.count -= some as u32;
         self.list.first = self.bin.next[block];
-        self.block = self.bin.blocks[block][..some].iter();
+        self.block = self.bin.records[block * BLOCK..][..some].iter();
+        if self.list.count > 0 {
+            self.ahead = self.bin.records[self.list.first as usize * BLOCK..][..BLOCK].iter();
+        }
         self.block.next()
     }
 }
@@ -129,7 +140,7 @@ impl Bins {
         control: &Control<'_>,
     ) -> Result<(), Cancelled> {
         let triangles = pass.model.triangles as usize;
-        self.used = runs_for(triangles);
+        self.used = runs_for(triangles, control);
         if self.runs.len() < self.used {
             self.runs.resize_with(self.used, Run::default);
         }
@@ -281,14 +292,14 @@ impl<'a> Setup<'a> {
 
 impl<T> Default for Bin<T> {
     fn default() -> Self {
-        Self { blocks: Vec::new(), next: Vec::new(), tiles: Vec::new(), count: 0 }
+        Self { records: Vec::new(), next: Vec::new(), tiles: Vec::new(), count: 0 }
     }
 }
 
 impl<T: Placed + Copy> Bin<T> {
     /// Forgets all records.
     pub(crate) fn clear(&mut self, grid: &TileGrid) {
-        self.blocks.clear();
+        self.records.clear();
         self.next.clear();
         self.tiles.clear();
         self.tiles.resize(grid.count(), List::default());
@@ -304,8 +315,8 @@ impl<T: Placed + Copy> Bin<T> {
             let list = &mut self.tiles[tile];
             let place = list.count as usize % BLOCK;
             if place == 0 {
-                let block = self.blocks.len() as u32;
-                self.blocks.push([record; BLOCK]);
+                let block = self.next.len() as u32;
+                self.records.resize(self.records.len() + BLOCK, record);
                 self.next.push(0);
                 if list.count == 0 {
                     list.first = block;
@@ -314,7 +325,7 @@ impl<T: Placed + Copy> Bin<T> {
                 }
                 list.last = block;
             } else {
-                self.blocks[list.last as usize][place] = record;
+                self.records[list.last as usize * BLOCK + place] = record;
             }
             list.count += 1;
         });
@@ -328,11 +339,11 @@ impl<T: Placed + Copy> Bin<T> {
     /// Lists the records of a tile.
     #[inline(always)]
     pub(crate) fn of_tile(&self, tile: usize) -> Records<'_, T> {
-        Records { bin: self, block: [].iter(), list: self.tiles[tile] }
+        Records { bin: self, block: [].iter(), ahead: [].iter(), list: self.tiles[tile] }
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        let blocks = self.blocks.capacity() * (size_of::<[T; BLOCK]>() + 4);
-        (blocks + self.tiles.capacity() * size_of::<List>()) as u64
+        let records = self.records.capacity() * size_of::<T>() + self.next.capacity() * size_of::<u32>();
+        (records + self.tiles.capacity() * size_of::<List>()) as u64
     }
 }

@@ -20,6 +20,23 @@ pub(crate) struct Span {
     pub(crate) y: i32,
 }
 
+/// Rows that are drawn together: a branch that the processor guesses wrong costs as much as several blocks of pixels,
+/// and so it is taken for all of them.
+pub(crate) const STRIP: usize = 4;
+
+/// The pixels of some rows that a triangle covers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Strip {
+    /// The first row in the picture, and counted within the tile.
+    pub(crate) y: i32,
+    pub(crate) row: usize,
+    /// The first column of each row, counted within the tile, and the number of columns; none where a row has none.
+    pub(crate) begin: [i32; STRIP],
+    pub(crate) length: [u32; STRIP],
+    /// The first block of columns that any row covers, and the end of them.
+    pub(crate) blocks: [usize; 2],
+}
+
 /// An edge function along the rows of a tile.
 #[derive(Clone, Copy)]
 struct Edge {
@@ -163,6 +180,8 @@ impl Spans {
         const ROWS: usize = TILE_HEIGHT as usize;
         let mut spans = Self { area: *area, x0: 0, y0: 0, y1: -1, before: [0; ROWS], end: [0; ROWS] };
         let Some(Pixels { x0, x1, y0, y1 }) = Pixels::of(record, area) else { return spans };
+        // Rows that are added in front are not covered.
+        let y0 = y0 - (y0 - area.y) % STRIP as i32;
         (spans.x0, spans.y0, spans.y1) = (x0, y0, y1);
         let edge = |corner| Edge::new(record, corner, x0, y0);
         let edges = [edge(0), edge(1), edge(2)];
@@ -180,6 +199,32 @@ impl Spans {
             (end.max(F64x8::ZERO) - half).nearest().store(&mut spans.end[first..]);
         }
         spans
+    }
+
+    /// Returns a strip from its first row on, counted in strips.
+    #[inline(always)]
+    pub(crate) fn strip(&self, index: usize) -> Strip {
+        let (first, x) = (index * STRIP, self.x0 - self.area.x);
+        let y = self.y0 + first as i32;
+        let mut strip = Strip { y, row: (y - self.area.y) as usize, ..Strip::default() };
+        let (mut from, mut to) = (TILE_WIDTH as i32, 0);
+        for row in 0..STRIP {
+            let (before, end) = (self.before[first + row], self.end[first + row]);
+            // Beyond the picture's last row a triangle may go on.
+            let is_empty = before >= end || y + row as i32 > self.y1;
+            strip.begin[row] = x + before;
+            strip.length[row] = if is_empty { 0 } else { (end - before) as u32 };
+            from = from.min(if is_empty { from } else { x + before });
+            to = to.max(if is_empty { to } else { x + end });
+        }
+        strip.blocks = [from as usize / BLOCK, (to as usize).div_ceil(BLOCK)];
+        strip
+    }
+
+    /// Counts the strips.
+    #[inline(always)]
+    pub(crate) fn strips(&self) -> usize {
+        ((self.y1 + 1 - self.y0) as usize).div_ceil(STRIP)
     }
 
     /// Lists those that are not empty.

@@ -6,6 +6,7 @@ use polyptych_core::convert::MeshModel;
 use polyptych_core::lanes::LANES;
 use polyptych_core::math::Aabb;
 use polyptych_core::scene::{AlphaMode, Material, Mesh, Object, Scene, Shape};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// All triangles of a scene, numbered through.
@@ -172,9 +173,14 @@ impl Model {
     /// Returns the part of a triangle, which is likely the given one.
     #[inline(always)]
     pub(crate) fn part_near(&self, part: usize, id: u32) -> usize {
-        let first = self.parts[part].first_triangle;
+        if self.triangles_of(part).contains(&id) { part } else { self.find(id).0 }
+    }
+
+    /// Returns the ids of the triangles of a part.
+    #[inline(always)]
+    pub(crate) fn triangles_of(&self, part: usize) -> Range<u32> {
         let end = self.parts.get(part + 1).map_or(self.triangles, |next| next.first_triangle);
-        if id >= first && id < end { part } else { self.find(id).0 }
+        self.parts[part].first_triangle..end
     }
 
     /// Returns the part of a triangle, and the triangle's index in it.

@@ -231,21 +231,31 @@ impl<'a> Painter<'a> {
 
     /// Names the objects of a tile and returns the number of pixels that they take.
     fn name(&self, area: &TileArea, buffer: &TileBuffer, band: &mut Band<'_>) -> u64 {
-        let (model, mut shaded, mut part) = (self.light.model, 0, 0);
+        let (model, mut shaded) = (self.light.model, 0);
+        let (mut known, mut object) = (NO_TRIANGLE..NO_TRIANGLE, 0);
         for row in 0..area.height as usize {
             let at =
                 (area.y as usize + row - band.first_row as usize) * band.width as usize + area.x as usize;
             let ids = &buffer.id[row * TILE_WIDTH as usize..][..area.width as usize];
-            for (pixel, &id) in (at..).zip(ids).filter(|(_, id)| **id != NO_TRIANGLE) {
-                part = model.part_near(part, id);
-                if let Some(object) = band.id.get_mut(pixel) {
-                    *object = model.parts[part].object as u32 + 1;
+            let pixels = at..at + ids.len();
+            if !band.id.is_empty() {
+                for (name, &id) in band.id[pixels.clone()].iter_mut().zip(ids) {
+                    if id != NO_TRIANGLE {
+                        if !known.contains(&id) {
+                            let part = model.find(id).0;
+                            known = model.triangles_of(part);
+                            object = model.parts[part].object as u32 + 1;
+                        }
+                        *name = object;
+                    }
                 }
-                if let Some(coverage) = band.coverage.get_mut(pixel) {
-                    *coverage = 1.0;
-                }
-                shaded += 1;
             }
+            if !band.coverage.is_empty() {
+                for (coverage, &id) in band.coverage[pixels].iter_mut().zip(ids) {
+                    *coverage = if id == NO_TRIANGLE { *coverage } else { 1.0 };
+                }
+            }
+            shaded += ids.iter().filter(|&&id| id != NO_TRIANGLE).count() as u64;
         }
         shaded
     }

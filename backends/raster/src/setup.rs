@@ -182,12 +182,18 @@ impl Record {
         self.plane.by_column * (f64::from((x << 8) + STEPS / 2 - self.x[0]) * (1.0 / f64::from(STEPS)))
     }
 
+    /// Returns how far the centers of eight columns are from the first corner, in pixels and exactly.
+    #[inline(always)]
+    pub(crate) fn offset_of_columns(&self, x: i32) -> F64x8 {
+        let steps =
+            I32x8::count_from(0) * I32x8::splat(STEPS) + I32x8::splat((x << 8) + STEPS / 2 - self.x[0]);
+        steps.to_f64() * F64x8::splat(1.0 / f64::from(STEPS))
+    }
+
     /// Returns what the centers of eight columns add.
     #[inline(always)]
-    pub(crate) fn depth_of_columns(&self, x: i32) -> F64x8 {
-        let offset =
-            I32x8::count_from(0) * I32x8::splat(STEPS) + I32x8::splat((x << 8) + STEPS / 2 - self.x[0]);
-        F64x8::splat(self.plane.by_column) * (offset.to_f64() * F64x8::splat(1.0 / f64::from(STEPS)))
+    pub(crate) fn depth_of_columns(&self, offset: F64x8) -> F64x8 {
+        F64x8::splat(self.plane.by_column) * offset
     }
 
     /// Rounds and holds eight depths; see [`Record::hold`].

@@ -5,7 +5,7 @@
 //! plane of the triangle that is seen there, held against the line's own point; next to the end of a line the triangles
 //! around that corner hide nothing of it. So edges need no offset towards the eye.
 
-use crate::bin::{Bin, PIECE, RUNS, run_of, runs_for};
+use crate::bin::{Bin, PIECE, run_of, runs_for};
 use crate::face::Faces;
 use crate::grid::{Placed, TILE_PIXELS, TILE_WIDTH, TileArea, TileGrid};
 use crate::lens::{GUARD, Homogeneous, Lens};
@@ -86,9 +86,9 @@ impl Strokes {
             self.seen.resize_with(lens.width as usize * lens.height as usize, AtomicU32::default);
         }
         let grid = TileGrid::new(lens.width, lens.height);
-        self.used = runs_for(lines.count());
+        self.used = runs_for(lines.count(), control);
         if self.runs.len() < self.used {
-            self.runs.resize_with(RUNS, Bin::default);
+            self.runs.resize_with(self.used, Bin::default);
         }
         let used = self.used;
         control.for_each_mut(&mut self.runs[..used], 1, &|i, run| {

@@ -1,19 +1,31 @@
 //! Which triangle is nearest on each pixel of a tile?
 
 use crate::bin::Bins;
-use crate::edges::{BLOCK, BLOCKS, Blocks, Pixels, Spans};
+use crate::edges::{BLOCK, BLOCKS, Blocks, Pixels, STRIP, Spans};
 use crate::grid::{TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH, TileArea};
 use crate::setup::Record;
 use polyptych_core::lanes::{F32x8, F64x8, I32x8, LANES, Mask8};
+use std::cell::Cell;
 
 /// The id of no triangle.
 pub(crate) const NO_TRIANGLE: u32 = u32::MAX;
 
-/// The nearest triangle on every pixel of a tile, and its depth: what one may call visible.
+/// The nearest triangle on every pixel of a tile, and its depth: what one may call visible. No block of pixels lies
+/// across the border of two of the processor's lines of memory.
+#[repr(align(64))]
 pub(crate) struct TileBuffer {
     pub(crate) depth: [f32; TILE_PIXELS],
     pub(crate) id: [u32; TILE_PIXELS],
 }
+
+/// A row of it.
+struct Line<'a> {
+    depth: &'a mut [f32; TILE_WIDTH as usize],
+    id: &'a mut [u32; TILE_WIDTH as usize],
+}
+
+/// The depth of pixels that a triangle does not cover: it is not above any, nor equal to one.
+const OUTSIDE: F32x8 = F32x8::new([f32::NAN; LANES]);
 
 /// The least depths of blocks of a tile.
 struct Coarse([f32; COARSE_COLUMNS * COARSE_ROWS]);
@@ -114,41 +126,38 @@ impl TileBuffer {
         let Some(pixels) = Pixels::of(record, area) else { return };
         match Blocks::new(record, area, &pixels) {
             Some(blocks) => self.draw_blocks::<TIES>(record, area, &pixels, &blocks, apart),
-            None => self.draw_spans::<TIES>(record, area, &pixels, apart),
+            None => self.draw_spans::<TIES>(record, area, apart),
         }
     }
 
-    /// Draws a triangle row by row. What columns add to depths is found once for all rows.
+    /// Draws a triangle some rows at a time. What columns add to depths is found once for them.
     #[inline(always)]
-    fn draw_spans<const TIES: bool>(
-        &mut self,
-        record: &Record,
-        area: &TileArea,
-        pixels: &Pixels,
-        apart: usize,
-    ) {
-        let mut columns = [F64x8::ZERO; BLOCKS];
-        let block = |x: i32| (x - area.x) as usize / BLOCK;
-        let first = block(pixels.x0);
-        for (i, columns) in columns[first..=block(pixels.x1)].iter_mut().enumerate() {
-            *columns = record.depth_of_columns(area.x + ((first + i) * BLOCK) as i32);
-        }
-        for span in Spans::of(record, area).iter() {
-            let row = F64x8::splat(record.depth_of_row(span.y));
-            let begin = span.first % TILE_WIDTH as usize;
-            let (line, end) = (span.first - begin, begin + span.length);
-            let blocks = begin / BLOCK..end.div_ceil(BLOCK);
-            for (i, columns) in columns[blocks.clone()].iter().enumerate() {
-                let first = (blocks.start + i) * BLOCK;
-                let at = line + first;
-                let depth = record.hold_all(row + *columns);
-                let mut outside = Mask8::NONE;
-                if first < begin || first + BLOCK > end {
-                    let past = I32x8::count_from(first as i32) - I32x8::splat(begin as i32);
-                    let before = I32x8::splat(end as i32 - 1) - I32x8::count_from(first as i32);
-                    outside = (past | before).is_negative();
+    fn draw_spans<const TIES: bool>(&mut self, record: &Record, area: &TileArea, apart: usize) {
+        let (depths, ids) = (in_blocks(&mut self.depth), in_blocks(&mut self.id));
+        let spans = Spans::of(record, area);
+        for strip in 0..spans.strips() {
+            let strip = spans.strip(strip);
+            let mut rows = [F64x8::ZERO; STRIP];
+            for (row, y) in rows.iter_mut().zip(strip.y..) {
+                *row = F64x8::splat(record.depth_of_row(y));
+            }
+            let old = (strip_of(depths, strip.row), strip_of(ids, strip.row));
+            let new = (strip_of(depths, strip.row + apart), strip_of(ids, strip.row + apart));
+            let first = (strip.blocks[0] * BLOCK) as i32;
+            let (mut place, mut offset) =
+                (I32x8::count_from(first), record.offset_of_columns(area.x + first));
+            for block in strip.blocks[0]..strip.blocks[1].min(BLOCKS) {
+                let column = record.depth_of_columns(offset);
+                for row in 0..STRIP {
+                    let inside = (place - I32x8::splat(strip.begin[row])).is_index_below(strip.length[row]);
+                    let depth = inside.pick(record.hold_all(rows[row] + column), OUTSIDE);
+                    let seen = (F32x8::new(old.0[row][block].get()), Mask8::new(old.1[row][block].get()));
+                    let (depth, ids) = nearer::<TIES>((depth, record.id), seen);
+                    new.0[row][block].set(depth.0.values());
+                    new.1[row][block].set(ids.0.values());
                 }
-                self.draw_block::<TIES>(at, apart, depth, outside, record.id);
+                place = place + I32x8::splat(BLOCK as i32);
+                offset = offset + F64x8::splat(BLOCK as f64);
             }
         }
     }
@@ -171,37 +180,26 @@ impl TileBuffer {
             let down = |k: usize| I32x8::splat(blocks.by_row[k]);
             let (down_a, down_b, down_c) = (down(0), down(1), down(2));
             let within = I32x8::splat(pixels.x1) - I32x8::count_from(x);
-            let columns = record.depth_of_columns(x);
+            let columns = record.depth_of_columns(record.offset_of_columns(x));
             for y in pixels.y0..=pixels.y1 {
-                let at = ((y - area.y) * TILE_WIDTH as i32 + x - area.x) as usize;
                 let depth = record.hold_all(F64x8::splat(record.depth_of_row(y)) + columns);
-                self.draw_block::<TIES>(at, apart, depth, (a | b | c | within).is_negative(), record.id);
+                let depth = (a | b | c | within).is_negative().pick(OUTSIDE, depth);
+                let mut to = self.line(((y - area.y) * TILE_WIDTH as i32) as usize);
+                to.draw_block::<TIES>((x - area.x) as usize, apart, depth, record.id);
                 (a, b, c) = (a + down_a, b + down_b, c + down_c);
             }
             first += BLOCK as i32;
         }
     }
 
-    /// Draws eight pixels of a triangle where they are not outside of it, and nearer than what is there. `apart` is
-    /// zero; see [`TileBuffer::fill`].
+    /// Returns the row of pixels that begins at one of them.
     #[inline(always)]
-    fn draw_block<const TIES: bool>(
-        &mut self,
-        at: usize,
-        apart: usize,
-        depth: F32x8,
-        outside: Mask8,
-        id: u32,
-    ) {
-        let (old, old_ids) = (F32x8::load(&self.depth[at..]), Mask8::load(&self.id[at..]));
-        let mut wins = depth.above(old);
-        if TIES {
-            wins = wins | (depth.equal(old) & are_above(old_ids, id));
-        }
-        let wins = wins & !outside;
-        let to = at + apart..at + apart + BLOCK;
-        wins.pick(depth, old).store(&mut self.depth[to.clone()]);
-        self.id[to].copy_from_slice(&*wins.pick_bits(Mask8::new([id; BLOCK]), old_ids).0);
+    fn line(&mut self, first: usize) -> Line<'_> {
+        const WIDTH: usize = TILE_WIDTH as usize;
+        let depth = self.depth[first..].first_chunk_mut::<WIDTH>();
+        let id = self.id[first..].first_chunk_mut::<WIDTH>();
+        let (Some(depth), Some(id)) = (depth, id) else { unreachable!("rows of a tile are full") };
+        Line { depth, id }
     }
 
     /// Draws a triangle with holes; `is_solid` tells for a place of the picture, asked only where it would win.
@@ -223,4 +221,47 @@ impl TileBuffer {
             }
         }
     }
+}
+
+impl Line<'_> {
+    /// Draws eight pixels of a triangle where it is nearer than what is there. `apart` is zero; see
+    /// [`TileBuffer::fill`].
+    #[inline(always)]
+    fn draw_block<const TIES: bool>(&mut self, at: usize, apart: usize, depth: F32x8, id: u32) {
+        const LAST: usize = TILE_WIDTH as usize - BLOCK;
+        // As the compiler cannot know, but neither place is beyond the last block's.
+        let (at, to) = (at.min(LAST), (at + apart).min(LAST));
+        let old = (F32x8::load(&self.depth[at..at + BLOCK]), Mask8::load(&self.id[at..at + BLOCK]));
+        let (depth, ids) = nearer::<TIES>((depth, id), old);
+        depth.store(&mut self.depth[to..to + BLOCK]);
+        self.id[to..to + BLOCK].copy_from_slice(&*ids.0);
+    }
+}
+
+/// Rows of blocks of pixels.
+type Rows<T> = [[Cell<[T; BLOCK]>; BLOCKS]];
+
+/// Returns the pixels of a tile by blocks, which may be read in one place while they are written in another.
+#[inline(always)]
+fn in_blocks<T>(pixels: &mut [T; TILE_PIXELS]) -> &Rows<T> {
+    Cell::from_mut(pixels.as_chunks_mut().0).as_slice_of_cells().as_chunks().0
+}
+
+/// Returns some rows from one on.
+#[inline(always)]
+fn strip_of<T>(rows: &Rows<T>, first: usize) -> &[[Cell<[T; BLOCK]>; BLOCKS]; STRIP] {
+    let Some(strip) = rows.get(first..).and_then(<[_]>::first_chunk) else {
+        unreachable!("the rows of a tile are whole strips")
+    };
+    strip
+}
+
+/// Returns what is visible on eight pixels, of a triangle and of what was there before.
+#[inline(always)]
+fn nearer<const TIES: bool>((depth, id): (F32x8, u32), (old, old_ids): (F32x8, Mask8)) -> (F32x8, Mask8) {
+    let mut wins = depth.above(old);
+    if TIES {
+        wins = wins | (depth.equal(old) & are_above(old_ids, id));
+    }
+    (wins.pick(depth, old), wins.pick_bits(Mask8::new([id; BLOCK]), old_ids))
 }
