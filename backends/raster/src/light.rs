@@ -107,6 +107,11 @@ impl Illumination<'_> {
         let (mut casting, mut reaching, one) = (F32x8::ZERO, F32x8::ZERO, F32x8::splat(1.0));
         for (index, lamp) in self.lamps.iter().enumerate() {
             let arrivals = Arrivals::of(lamp, batch, origin);
+            // Asked for before the light is reckoned, read after it.
+            let shadows = self.shadows.filter(|_| lamp.light.casts_shadow && taking.any());
+            let from = shadows.map_or(DVec3::ZERO, |shadows| origin - shadows.origin);
+            let place = batch.place + DVec3x8::splat(from);
+            let aims = if let Some(shadows) = shadows { shadows.aim(index, place) } else { None };
             let added = match corners {
                 _ if !wants.color => Vec3x8::splat(Vec3::ZERO),
                 None => self.added(batch, &arrivals),
@@ -119,15 +124,16 @@ impl Illumination<'_> {
             let mut arrives = comes & faces_light & counts;
             let crosses = if casts { arrives & taking } else { Mask8::NONE };
             let mut share = one;
-            if let Some(shadows) = self.shadows.filter(|_| crosses.any()) {
+            if let Some(shadows) = shadows.filter(|_| crosses.any()) {
                 let sights = Sights {
-                    place: batch.place + DVec3x8::splat(origin - shadows.origin),
+                    place,
                     triangle: batch.names.id,
                     to_light: arrivals.to_light,
                     distance: arrivals.distance,
                 };
                 let of = (self.scene, self.model);
-                share = crosses.pick(shadows.shares(index, of, &sights, &batch.true_normal, crosses), one);
+                share = crosses
+                    .pick(shadows.shares((index, aims), of, &sights, &batch.true_normal, crosses), one);
                 arrives = arrives & share.above(F32x8::ZERO);
             }
             batch.lit = Vec3x8::pick(arrives, batch.lit + added.scaled(share), batch.lit);

@@ -22,6 +22,7 @@ use crate::shadow::{MapFace, Shadows, looking};
 use crate::tile::NO_TRIANGLE;
 use glam::DVec3;
 use polyptych_core::lanes::{DVec3x8, F64x8, LANES, Mask8};
+use polyptych_core::registers::fetch;
 use polyptych_core::scene::Scene;
 
 /// The ways from eight points to a light.
@@ -32,6 +33,18 @@ pub(crate) struct Sights {
     pub(crate) triangle: [u32; LANES],
     pub(crate) to_light: DVec3x8,
     pub(crate) distance: F64x8,
+}
+
+/// Where eight points fall on a map with one face.
+pub(crate) struct Aims<'a> {
+    face: &'a MapFace,
+    /// Which of them it sees.
+    sees: Mask8,
+    /// See [`Looks::texel`].
+    texel: [[i32; 2]; LANES],
+    /// Where the four texels begin among all, if they are on one tile.
+    square: [usize; LANES],
+    is_whole: [bool; LANES],
 }
 
 /// What the map of a light shows around eight points.
@@ -73,45 +86,61 @@ impl Sights {
     }
 }
 
+impl<'a> Aims<'a> {
+    /// Finds where eight points fall on a face, and asks for the texels there. Maps are larger than caches: other work
+    /// should be done before they are [read](Looks::read).
+    #[inline(always)]
+    pub(crate) fn at(face: &'a MapFace, places: DVec3x8) -> Self {
+        let [x, y, ahead] = face.lens.places(places - DVec3x8::splat(face.lens.origin));
+        let at = F64x8::splat;
+        let (right, bottom) = (f64::from(face.lens.width) + 0.5, f64::from(face.lens.height) + 0.5);
+        let within = |v: F64x8, end: f64| v.at_least(at(-0.5)) & at(end).at_least(v);
+        let sees = ahead.above(at(0.0)) & within(x, right) & within(y, bottom);
+        // The corners of a square of four texels' centers are around the point.
+        let (column, row) = (x.nearest().0, y.nearest().0);
+        let (width, height) = (face.lens.width as i32, face.lens.height as i32);
+        let mut aims =
+            Self { face, sees, texel: [[0; 2]; LANES], square: [0; LANES], is_whole: [false; LANES] };
+        let texels = face.tiles.as_flattened();
+        for i in 0..LANES {
+            let (column, row) = (column[i].wrapping_sub(1), row[i].wrapping_sub(1));
+            aims.texel[i] = [column, row];
+            let is_on_map = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1);
+            aims.is_whole[i] = is_on_map & (sees.0[i] != 0) & MapFace::is_in_one_tile(column, row);
+            aims.square[i] = if aims.is_whole[i] { face.place_of(column, row) } else { 0 };
+            fetch(&texels[aims.square[i]]);
+            fetch(&texels[aims.square[i] + TILE_WIDTH as usize]);
+        }
+        aims
+    }
+}
+
 impl<'a> Looks<'a> {
     fn none() -> Self {
         Self { face: [None; LANES], texel: [[0; 2]; LANES], ids: [[NO_TRIANGLE; 4]; LANES] }
     }
 
-    /// Looks where eight points fall on columns and rows of a face. Maps are larger than caches: where texels are in
-    /// memory is found for all points first, so that the memory is asked for all of them at once.
+    /// Reads the texels at the wanted points.
     #[inline(always)]
-    fn look_all(&mut self, face: &'a MapFace, [x, y, ahead]: [F64x8; 3], wanted: Mask8) {
-        let at = F64x8::splat;
-        let (right, bottom) = (f64::from(face.lens.width) + 0.5, f64::from(face.lens.height) + 0.5);
-        let within = |v: F64x8, end: f64| v.at_least(at(-0.5)) & at(end).at_least(v);
-        let sees = wanted & ahead.above(at(0.0)) & within(x, right) & within(y, bottom);
-        // The corners of a square of four texels' centers are around the point.
-        let (column, row) = (x.nearest().0, y.nearest().0);
-        let (width, height) = (face.lens.width as i32, face.lens.height as i32);
-        let (mut square, mut is_whole) = ([0; LANES], [false; LANES]);
-        for i in 0..LANES {
-            let (column, row) = (column[i].wrapping_sub(1), row[i].wrapping_sub(1));
-            self.texel[i] = [column, row];
-            let is_on_map = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1);
-            is_whole[i] = is_on_map & (sees.0[i] != 0) & MapFace::is_in_one_tile(column, row);
-            square[i] = if is_whole[i] { face.place_of(column, row) } else { 0 };
+    pub(crate) fn read(aims: &Aims<'a>, wanted: Mask8) -> Self {
+        let mut looks = Self { texel: aims.texel, ..Self::none() };
+        let texels = aims.face.tiles.as_flattened();
+        for (ids, &square) in looks.ids.iter_mut().zip(&aims.square) {
+            let (upper, lower) = (&texels[square..][..2], &texels[square + TILE_WIDTH as usize..][..2]);
+            *ids = [upper[0], upper[1], lower[0], lower[1]];
         }
-        let texels = face.tiles.as_flattened();
+        let sees = aims.sees & wanted;
         for i in 0..LANES {
-            let (upper, lower) = (&texels[square[i]..][..2], &texels[square[i] + TILE_WIDTH as usize..][..2]);
-            self.ids[i] = [upper[0], upper[1], lower[0], lower[1]];
-        }
-        for (i, is_whole) in is_whole.into_iter().enumerate() {
             if !sees.has(i) {
-                self.ids[i] = [NO_TRIANGLE; 4];
+                looks.ids[i] = [NO_TRIANGLE; 4];
                 continue;
             }
-            self.face[i] = Some(face);
-            if !is_whole {
-                self.ids[i] = face.square(self.texel[i][0], self.texel[i][1]);
+            looks.face[i] = Some(aims.face);
+            if !aims.is_whole[i] {
+                looks.ids[i] = aims.face.square(aims.texel[i][0], aims.texel[i][1]);
             }
         }
+        looks
     }
 
     /// Looks where a point falls on a column and row of a face, if the light sees them.
@@ -157,16 +186,11 @@ impl Blocker {
 }
 
 impl Shadows {
-    /// Looks points, relative to the origin of the shadows, up in the maps of a light.
+    /// Looks points, relative to the origin of the shadows, up in the maps of a light, one by one.
     #[inline(always)]
     pub(crate) fn look<'f>(&self, faces: &'f [MapFace], places: DVec3x8, wanted: Mask8) -> Looks<'f> {
         let mut looks = Looks::none();
         let Some(first) = faces.first() else { return looks };
-        if faces.len() == 1 {
-            let at = first.lens.places(places - DVec3x8::splat(first.lens.origin));
-            looks.look_all(first, at, wanted);
-            return looks;
-        }
         for i in (0..LANES).filter(|&i| wanted.has(i)) {
             let place = places.get(i);
             let face = &faces[cube_face(place - first.lens.origin)];

@@ -12,7 +12,7 @@ use crate::grid::{TILE_PIXELS, TileGrid};
 use crate::info::Tier;
 use crate::lens::{Lens, Rays, cube_axes};
 use crate::light::Lamp;
-use crate::lookup::Sights;
+use crate::lookup::{Aims, Looks, Sights};
 use crate::model::{Model, Part, Role};
 use crate::tile::{NO_TRIANGLE, TileBuffer};
 use crate::transform::{ScreenVertices, transform};
@@ -208,11 +208,20 @@ impl Shadows {
         Ok(shadows)
     }
 
-    /// Returns which share of a light arrives at each of the wanted points; `normal` are their true normals.
+    /// Finds where points, relative to the origin of the shadows, fall on the map of a light that has one face and
+    /// names triangles.
+    #[inline(always)]
+    pub(crate) fn aim(&self, lamp: usize, places: DVec3x8) -> Option<Aims<'_>> {
+        let map = &self.maps[lamp];
+        if let (false, [face]) = (map.is_plain, &*map.faces) { Some(Aims::at(face, places)) } else { None }
+    }
+
+    /// Returns which share of a light arrives at each of the wanted points; `normal` are their true normals, `aims` what
+    /// [`Shadows::aim`] returned for them.
     #[inline(always)]
     pub(crate) fn shares(
         &self,
-        lamp: usize,
+        (lamp, aims): (usize, Option<Aims<'_>>),
         of: (&Scene, &Model),
         sights: &Sights,
         normal: &DVec3x8,
@@ -223,7 +232,10 @@ impl Shadows {
             return self.shares_of_depths(&map.faces, sights, normal, wanted);
         }
         let blocked = if map.cells.is_empty() {
-            let looks = self.look(&map.faces, sights.place, wanted);
+            let looks = match &aims {
+                Some(aims) => Looks::read(aims, wanted),
+                None => self.look(&map.faces, sights.place, wanted),
+            };
             self.blocked(of, &looks, sights, wanted)
         } else {
             self.blocked_exactly(of, &map.cells, sights, wanted)
