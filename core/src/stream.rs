@@ -146,7 +146,7 @@ impl World {
         let [cx, cy, _] = self.limits.chunks.map(|c| c as usize);
         let mut wanted = Vec::new();
         let middle = self.limits.chunks.map(|c| (c / 2) as i32);
-        for index in 0..self.window.chunks().len() {
+        for index in 0..self.window.chunk_count() {
             let within = [index % cx, index / cx % cy, index / (cx * cy)].map(|c| c as i32);
             let place = std::array::from_fn(|a| first[a] + within[a]);
             let chunk = match self.loaded.get_mut(&place) {
@@ -252,7 +252,7 @@ impl World {
     #[must_use]
     pub fn missing(&self) -> usize {
         let there = self.loaded.values().filter(|loaded| loaded.seen == self.clock).count();
-        self.window.chunks().len() - there
+        self.window.chunk_count() - there
     }
 }
 

@@ -148,9 +148,9 @@ impl TileBuffer {
                 (I32x8::count_from(first), record.offset_of_columns(area.x + first));
             for block in strip.blocks[0]..strip.blocks[1].min(BLOCKS) {
                 let column = record.depth_of_columns(offset);
-                for row in 0..STRIP {
+                for (row, depth_of_row) in rows.iter().enumerate() {
                     let inside = (place - I32x8::splat(strip.begin[row])).is_index_below(strip.length[row]);
-                    let depth = inside.pick(record.hold_all(rows[row] + column), OUTSIDE);
+                    let depth = inside.pick(record.hold_all(*depth_of_row + column), OUTSIDE);
                     let seen = (F32x8::new(old.0[row][block].get()), Mask8::new(old.1[row][block].get()));
                     let (depth, ids) = nearer::<TIES>((depth, record.id), seen);
                     new.0[row][block].set(depth.0.values());

@@ -76,7 +76,7 @@ impl Grid {
 
     /// Returns the bytes held, chunks that are shared not counted.
     pub(crate) fn bytes(&self) -> u64 {
-        self.seen.bytes() + self.blocking.bytes() + self.voxels.chunks().len() as u64 * 16
+        self.seen.bytes() + self.blocking.bytes() + self.voxels.chunk_count() as u64 * 16
     }
 
     /// Returns how many cells of a chunk lie in the grid along each axis.
@@ -86,13 +86,13 @@ impl Grid {
     }
 
     /// Takes over chunks that became others.
-    fn update(&mut self, changed: &[usize], chunks: &[Chunk]) {
+    fn update(&mut self, changed: &[usize], voxels: &Voxels) {
         // Both layers hold the table: only who holds it alone may change it where it is.
         self.blocking.masks = Arc::new(Masks::NONE);
         let masks = Arc::make_mut(&mut self.seen.masks);
         let [seen, blocking] = self.values;
         for &index in changed {
-            let (old, chunk) = (&self.voxels.chunks()[index], &chunks[index]);
+            let (old, chunk) = (self.voxels.chunk(index), voxels.chunk(index));
             let end = Self::end(&self.voxels, index);
             let renew = |masks: &mut Masks, slot: u32, values: &Values| {
                 if let (Chunk::Cells(old), Chunk::Cells(new)) = (old, chunk) {
@@ -121,8 +121,9 @@ impl Grid {
             } else {
                 *other = renew(masks, *other, &blocking);
             }
-            self.voxels.put_chunk(index, chunk.clone());
         }
+        // What is compared next time is then the same in memory.
+        self.voxels = voxels.clone();
         self.blocking.masks = self.seen.masks.clone();
     }
 }
@@ -150,7 +151,7 @@ const BUILT_AT_ONCE: usize = 256;
 impl Recipe {
     /// Nothing for an empty chunk.
     fn of(voxels: &Voxels, index: usize) -> Option<Self> {
-        let source = match &voxels.chunks()[index] {
+        let source = match voxels.chunk(index) {
             Chunk::Uniform(0) => return None,
             Chunk::Uniform(value) => Source::Uniform(*value),
             Chunk::Cells(cells) => Source::Cells(cells.as_ptr().addr()),
@@ -205,10 +206,8 @@ impl Chunks {
 
     /// Changes a grid of before, if there is one that most chunks are those of.
     fn edited(&mut self, voxels: &Voxels, values: [Values; 2]) -> Option<Arc<Grid>> {
-        let changed_of = |old: &Grid| -> Vec<usize> {
-            let pairs = voxels.chunks().iter().zip(old.voxels.chunks()).enumerate();
-            pairs.filter(|(_, (new, old))| !new.is_same(old)).map(|(i, _)| i).take(MOST_EDITED + 1).collect()
-        };
+        let changed_of =
+            |old: &Grid| -> Vec<usize> { voxels.changed_from(&old.voxels).take(MOST_EDITED + 1).collect() };
         let (at, changed) = self.kept.iter().enumerate().find_map(|(at, old)| {
             let is_alike = old.voxels.size() == voxels.size() && old.values == values;
             let changed = is_alike.then(|| changed_of(old))?;
@@ -216,7 +215,7 @@ impl Chunks {
         })?;
         let mut grid = self.kept.swap_remove(at);
         if !changed.is_empty() {
-            Arc::make_mut(&mut grid).update(&changed, voxels.chunks());
+            Arc::make_mut(&mut grid).update(&changed, voxels);
         }
         self.built += changed.len() as u64;
         Some(grid)
@@ -230,10 +229,10 @@ impl Chunks {
         control: &Control<'_>,
     ) -> Result<Grid, Cancelled> {
         let recipes: Vec<Option<Recipe>> =
-            (0..voxels.chunks().len()).map(|index| Recipe::of(voxels, index)).collect();
+            (0..voxels.chunk_count()).map(|index| Recipe::of(voxels, index)).collect();
         let wanted: HashSet<Recipe> = recipes.iter().flatten().copied().collect();
         let shared = |old: &Arc<Grid>| {
-            let recipes = (0..old.voxels.chunks().len()).filter_map(|index| Recipe::of(&old.voxels, index));
+            let recipes = (0..old.voxels.chunk_count()).filter_map(|index| Recipe::of(&old.voxels, index));
             if old.values == values { recipes.filter(|recipe| wanted.contains(recipe)).count() } else { 0 }
         };
         let most = (0..self.kept.len()).max_by_key(|&at| shared(&self.kept[at]));
@@ -241,7 +240,7 @@ impl Chunks {
         let mut known: HashMap<Recipe, [u32; 2]> = HashMap::new();
         let mut masks = Masks::default();
         if let Some(old) = old {
-            for index in 0..old.voxels.chunks().len() {
+            for index in 0..old.voxels.chunk_count() {
                 if let Some(recipe) = Recipe::of(&old.voxels, index).filter(|recipe| wanted.contains(recipe))
                 {
                     known.insert(recipe, [old.seen.slots[index], old.blocking.slots[index]]);

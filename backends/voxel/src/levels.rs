@@ -91,7 +91,7 @@ pub(crate) fn of(
 ) -> Result<[Coarse; 2], Cancelled> {
     let colors: Vec<Vec3> =
         (0..256usize).map(|v| scene.material(object, v.saturating_sub(1)).base_color).collect();
-    let mut chunks: Vec<Vec<Block>> = vec![Vec::new(); voxels.chunks().len()];
+    let mut chunks: Vec<Vec<Block>> = vec![Vec::new(); voxels.chunk_count()];
     control.for_each_mut(&mut chunks, 1, &|index, blocks| {
         *blocks = blocks_of(grid, voxels, index, &colors);
     })?;
@@ -144,7 +144,7 @@ pub(crate) fn of(
 /// Collects the blocks of a chunk; none where it is empty.
 fn blocks_of(grid: &Grid, voxels: &Voxels, index: usize, colors: &[Vec3]) -> Vec<Block> {
     let first = voxels.chunk_origin(index);
-    let whole = match &voxels.chunks()[index] {
+    let whole = match voxels.chunk(index) {
         Chunk::Uniform(0) => return Vec::new(),
         Chunk::Uniform(value) if is_buried(voxels, first) => Some(*value),
         _ => None,
@@ -176,7 +176,7 @@ fn is_buried(voxels: &Voxels, first: [u32; 3]) -> bool {
             let is_there = next[0] < cx && next[1] < cy && next[2] < cz;
             let index =
                 || (next[2] as usize * cy as usize + next[1] as usize) * cx as usize + next[0] as usize;
-            is_there && !matches!(voxels.chunks()[index()], Chunk::Uniform(0) | Chunk::Cells(_))
+            is_there && !matches!(voxels.chunk(index()), Chunk::Uniform(0) | Chunk::Cells(_))
         })
     })
 }

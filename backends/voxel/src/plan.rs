@@ -99,7 +99,7 @@ fn plan_object(
             return plan(Decision::Exact, String::new(), 0);
         }
         let masks = masks(scene, object, voxels);
-        let bytes = masks * size_of::<Occupancy>() as u64 + voxels.chunks().len() as u64 * PER_CHUNK;
+        let bytes = masks * size_of::<Occupancy>() as u64 + voxels.chunk_count() as u64 * PER_CHUNK;
         return plan(Decision::Exact, format!("{masks} masks of chunks"), bytes);
     }
     let detail = model::detail(object, need, resolution);
@@ -134,7 +134,6 @@ fn masks(scene: &Scene, object: &Object, voxels: &Voxels) -> u64 {
     };
     voxels
         .chunks()
-        .iter()
         .enumerate()
         .map(|(index, chunk)| match chunk {
             Chunk::Uniform(value) => {

@@ -185,7 +185,7 @@ mod tests {
             .unwrap()
             .voxels;
         let mut full = std::collections::HashSet::new();
-        let chunks = voxels.chunks().iter().filter(|chunk| match chunk {
+        let chunks = voxels.chunks().filter(|chunk| match chunk {
             Chunk::Uniform(value) => *value != 0 && full.insert(*value),
             Chunk::Cells(_) => true,
         });

@@ -156,7 +156,7 @@ impl Voxels {
         let index = self.index_of_chunk(place);
         let low: [u32; 3] = std::array::from_fn(|a| from[a].saturating_sub(origin[a]));
         let high: [u32; 3] = std::array::from_fn(|a| CHUNK.min(to[a] - origin[a]));
-        let chunk = &self.chunks()[index];
+        let chunk = self.chunk(index);
         let mut changes = Vec::new();
         if let Chunk::Uniform(byte) = *chunk {
             let is_whole = matches!(region, Region::Box { .. }) && low == [0; 3] && high == [CHUNK; 3];
@@ -195,7 +195,7 @@ impl Voxels {
         let mut part = Part { chunk: index, change: Change::Cells(changes) };
         part.apply(self, Side::After);
         if let Some(before) = before {
-            part.change = Change::Whole(before, self.chunks()[index].clone());
+            part.change = Change::Whole(before, self.chunk(index).clone());
         }
         edit.parts.push(part);
     }

@@ -10,12 +10,14 @@ pub const CHUNK: u32 = 64;
 /// A grid of any size; cell `(x, y, z)` fills `[x, x+1] x [y, y+1] x [z, z+1]` in object space.
 ///
 /// Byte 0 is empty; byte `v` has the material of slot `v - 1`. Cells live in chunks of 64^3 that clones
-/// share until one of them is edited.
+/// share until one of them is edited, and these in groups that clones share as well: an edit of a large grid copies
+/// what it touches.
 #[derive(Clone, Debug)]
 pub struct Voxels {
     size: [u32; 3],
     chunks_per_axis: [u32; 3],
-    chunks: Vec<Chunk>,
+    /// All but the last are full.
+    groups: Vec<Arc<[Chunk]>>,
 }
 
 impl Chunk {
@@ -41,6 +43,8 @@ pub enum Chunk {
 }
 
 const CHUNK_CELLS: usize = (CHUNK * CHUNK * CHUNK) as usize;
+/// Chunks in a group.
+const GROUP: usize = 64;
 
 impl Voxels {
     /// Builds an empty grid.
@@ -49,9 +53,13 @@ impl Voxels {
     /// When the number of chunks does not fit into memory's address range; loaders check sizes before.
     #[must_use]
     pub fn new(size: [u32; 3]) -> Self {
-        let chunks_per_axis = size.map(|s| s.div_ceil(CHUNK));
-        let count = chunks_per_axis.iter().map(|&c| c as usize).product();
-        Self { size, chunks_per_axis, chunks: vec![Chunk::Uniform(0); count] }
+        let count = size.iter().map(|s| s.div_ceil(CHUNK) as usize).product();
+        Self::of(size, &vec![Chunk::Uniform(0); count])
+    }
+
+    fn of(size: [u32; 3], chunks: &[Chunk]) -> Self {
+        let groups = chunks.chunks(GROUP).map(Arc::from).collect();
+        Self { size, chunks_per_axis: size.map(|s| s.div_ceil(CHUNK)), groups }
     }
 
     /// Builds a grid from bytes, x fastest, then y, then z.
@@ -63,7 +71,7 @@ impl Voxels {
         let [nx, ny, nz] = size.map(|s| s as usize);
         assert_eq!(bytes.len(), nx * ny * nz, "bytes of a {nx}x{ny}x{nz} grid");
         let mut grid = Self::new(size);
-        for index in 0..grid.chunks.len() {
+        for index in 0..grid.chunk_count() {
             let first = grid.chunk_origin(index);
             let end: [u32; 3] = std::array::from_fn(|a| CHUNK.min(size[a] - first[a]));
             let mut cells = vec![0u8; CHUNK_CELLS];
@@ -75,11 +83,9 @@ impl Voxels {
                 }
             }
             // Cells beyond the grid are empty: only whole chunks are one value.
-            if cells.iter().all(|&b| b == cells[0]) {
-                grid.chunks[index] = Chunk::Uniform(cells[0]);
-            } else {
-                grid.chunks[index] = Chunk::Cells(cells.into());
-            }
+            let is_one = cells.iter().all(|&b| b == cells[0]);
+            *grid.chunk_mut(index) =
+                if is_one { Chunk::Uniform(cells[0]) } else { Chunk::Cells(cells.into()) };
         }
         grid
     }
@@ -88,7 +94,7 @@ impl Voxels {
     #[must_use]
     pub fn from_fn(size: [u32; 3], cell: impl Fn(u32, u32, u32) -> u8) -> Self {
         let mut grid = Self::new(size);
-        for index in 0..grid.chunks.len() {
+        for index in 0..grid.chunk_count() {
             let first = grid.chunk_origin(index);
             let mut bytes = vec![0u8; CHUNK_CELLS];
             for z in 0..CHUNK.min(size[2] - first[2]) {
@@ -98,7 +104,7 @@ impl Voxels {
                     }
                 }
             }
-            grid.chunks[index] =
+            *grid.chunk_mut(index) =
                 if bytes.iter().all(|&b| b == 0) { Chunk::Uniform(0) } else { Chunk::Cells(bytes.into()) };
         }
         grid
@@ -108,16 +114,15 @@ impl Voxels {
     ///
     /// # Errors
     /// When the number of chunks, or of cells in one, does not fit.
-    pub fn from_chunks(size: [u32; 3], chunks: Vec<Chunk>) -> Result<Self, String> {
-        let chunks_per_axis = size.map(|s| s.div_ceil(CHUNK));
-        let count = chunks_per_axis.iter().map(|&c| u128::from(c)).product::<u128>();
+    pub fn from_chunks(size: [u32; 3], chunks: &[Chunk]) -> Result<Self, String> {
+        let count = size.iter().map(|s| u128::from(s.div_ceil(CHUNK))).product::<u128>();
         if chunks.len() as u128 != count {
             return Err(format!("{} chunks where {count} are needed", chunks.len()));
         }
         if chunks.iter().any(|c| matches!(c, Chunk::Cells(cells) if cells.len() != CHUNK_CELLS)) {
             return Err(format!("a chunk without its {CHUNK_CELLS} cells"));
         }
-        Ok(Self { size, chunks_per_axis, chunks })
+        Ok(Self::of(size, chunks))
     }
 
     /// Returns the number of cells along each axis.
@@ -132,10 +137,38 @@ impl Voxels {
         self.chunks_per_axis
     }
 
-    /// Returns the chunks, x fastest, then y, then z.
+    /// Returns the number of chunks.
     #[must_use]
-    pub fn chunks(&self) -> &[Chunk] {
-        &self.chunks
+    pub fn chunk_count(&self) -> usize {
+        self.chunks_per_axis.iter().map(|&c| c as usize).product()
+    }
+
+    /// Returns the chunks, x fastest, then y, then z.
+    pub fn chunks(&self) -> impl Iterator<Item = &Chunk> {
+        self.groups.iter().flat_map(|group| group.iter())
+    }
+
+    /// Returns a chunk by its number among [`Voxels::chunks`].
+    ///
+    /// # Panics
+    /// When there are less.
+    #[must_use]
+    #[inline]
+    pub fn chunk(&self, index: usize) -> &Chunk {
+        &self.groups[index / GROUP][index % GROUP]
+    }
+
+    fn chunk_mut(&mut self, index: usize) -> &mut Chunk {
+        &mut Arc::make_mut(&mut self.groups[index / GROUP])[index % GROUP]
+    }
+
+    /// Lists the numbers of the chunks that are not those of another grid of this size.
+    pub fn changed_from<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = usize> + 'a {
+        let groups = self.groups.iter().zip(&other.groups).enumerate();
+        groups.filter(|(_, (new, old))| !Arc::ptr_eq(new, old)).flat_map(|(group, (new, old))| {
+            let chunks = new.iter().zip(old.iter()).enumerate();
+            chunks.filter(|(_, (new, old))| !new.is_same(old)).map(move |(i, _)| group * GROUP + i)
+        })
     }
 
     /// Returns the first cell of a chunk.
@@ -152,7 +185,7 @@ impl Voxels {
         if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] {
             return 0;
         }
-        match &self.chunks[self.chunk_index(x, y, z)] {
+        match self.chunk(self.chunk_index(x, y, z)) {
             Chunk::Uniform(value) => *value,
             Chunk::Cells(cells) => cells[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)],
         }
@@ -168,9 +201,9 @@ impl Voxels {
 
     /// Returns the cells of a chunk to be changed: a copy, where a clone of the grid holds them, too.
     pub(super) fn cells_mut(&mut self, index: usize) -> &mut [u8] {
-        let chunk = &mut self.chunks[index];
+        let chunk = self.chunk_mut(index);
         if let Chunk::Uniform(all) = *chunk {
-            *chunk = Chunk::Cells(vec![all; CHUNK_CELLS].into());
+            *chunk = Chunk::Cells(std::iter::repeat_n(all, CHUNK_CELLS).collect());
         }
         let Chunk::Cells(cells) = chunk else { unreachable!("the chunk was just given cells") };
         Arc::make_mut(cells)
@@ -192,7 +225,7 @@ impl Voxels {
                 || matches!(&chunk, Chunk::Cells(cells) if cells.len() == CHUNK_CELLS),
             "a chunk has {CHUNK_CELLS} cells"
         );
-        self.chunks[index] = chunk;
+        *self.chunk_mut(index) = chunk;
     }
 
     #[inline]
@@ -212,7 +245,7 @@ impl Voxels {
 
     /// Calls `visit` for every filled cell, chunk by chunk.
     pub fn for_each_filled(&self, mut visit: impl FnMut([u32; 3], u8)) {
-        for (index, chunk) in self.chunks.iter().enumerate() {
+        for (index, chunk) in self.chunks().enumerate() {
             if matches!(chunk, Chunk::Uniform(0)) {
                 continue;
             }
@@ -271,7 +304,7 @@ impl Voxels {
     #[must_use]
     pub fn filled_bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
-        for (index, chunk) in self.chunks.iter().enumerate() {
+        for (index, chunk) in self.chunks().enumerate() {
             let first = self.chunk_origin(index);
             let end: [u32; 3] = std::array::from_fn(|a| CHUNK.min(self.size[a] - first[a]));
             let place =
@@ -304,8 +337,7 @@ impl Voxels {
     /// Returns the bytes held, chunks shared with clones counted in full.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.chunks
-            .iter()
+        self.chunks()
             .map(|c| match c {
                 Chunk::Uniform(_) => 16,
                 Chunk::Cells(cells) => cells.len() as u64 + 16,
@@ -358,9 +390,19 @@ mod tests {
         let mut after = before.clone();
         after.set(3, 4, 5, 9);
         assert_eq!((before.get(3, 4, 5), after.get(3, 4, 5)), (1, 9));
-        let (Chunk::Cells(a), Chunk::Cells(b)) = (&before.chunks()[1], &after.chunks()[1]) else {
-            panic!("both chunks hold cells");
-        };
-        assert!(Arc::ptr_eq(a, b), "the chunk that was not edited is shared");
+        assert!(before.chunk(1).is_same(after.chunk(1)), "the chunk that was not edited is shared");
+    }
+
+    #[test]
+    fn an_edit_of_a_large_grid_leaves_the_other_groups_shared() {
+        let before = Voxels::new([1024, 64, 1024]);
+        let mut after = before.clone();
+        assert_eq!(after.changed_from(&before).count(), 0);
+        after.set(1000, 4, 5, 9);
+        after.set(3, 4, 700, 9);
+        assert_eq!(after.changed_from(&before).collect::<Vec<_>>(), [15, 160]);
+        let shared = before.groups.iter().zip(&after.groups).filter(|(a, b)| Arc::ptr_eq(a, b)).count();
+        assert_eq!((before.groups.len(), shared), (4, 2), "groups of {GROUP} chunks");
+        assert_eq!(before.chunk_count(), before.chunks().count());
     }
 }

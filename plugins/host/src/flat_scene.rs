@@ -146,7 +146,7 @@ fn mesh(place: &mut impl Place, id: u64, mesh: &Mesh) -> PolyptychMesh {
 }
 
 fn voxels(place: &mut impl Place, id: u64, voxels: &Voxels) -> PolyptychVoxels {
-    let chunks = voxels.chunks().iter().enumerate().map(|(index, chunk)| match chunk {
+    let chunks = voxels.chunks().enumerate().map(|(index, chunk)| match chunk {
         Chunk::Uniform(value) => PolyptychChunk { cells: null(), uniform: u64::from(*value) },
         Chunk::Cells(cells) => PolyptychChunk { cells: place.lend((id, index as u32), cells), uniform: 0 },
     });

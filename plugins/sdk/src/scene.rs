@@ -237,7 +237,7 @@ unsafe fn voxels(flat: &abi::PolyptychVoxels) -> Result<Voxels, String> {
             Chunk::Cells(unsafe { slice(chunk.cells, 64 * 64 * 64) }.into())
         }
     });
-    Voxels::from_chunks(flat.cells, chunks.collect())
+    Voxels::from_chunks(flat.cells, &chunks.collect::<Vec<_>>())
 }
 
 unsafe fn volume(flat: &abi::PolyptychVolume) -> Result<Volume, String> {

@@ -57,7 +57,7 @@ fn chunk_value(voxels: &Voxels, cell: [i64; 3]) -> ChunkValue {
     let [x, y, z] = cell.map(|c| c as u32);
     let [cx, cy, _] = voxels.chunks_per_axis().map(|c| c as usize);
     let index = ((z / CHUNK) as usize * cy + (y / CHUNK) as usize) * cx + (x / CHUNK) as usize;
-    match &voxels.chunks()[index] {
+    match voxels.chunk(index) {
         Chunk::Uniform(0) => ChunkValue::Empty,
         _ => ChunkValue::Cell(voxels.get(x, y, z)),
     }
