@@ -3,7 +3,8 @@
 //! Most pictures show bodies before a background. Where a tile had no triangle and has none again, its planes hold what
 //! they should: it need not be written, which costs more than anything else there.
 
-use crate::lens::{Lens, Linear};
+use crate::affine::Linear;
+use crate::lens::Lens;
 use polyptych_core::framebuffer::{Channel, Framebuffer};
 use polyptych_core::scene::Background;
 use std::sync::atomic::{AtomicBool, Ordering};

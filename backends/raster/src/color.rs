@@ -3,7 +3,8 @@
 //! Texture coordinates are weighted by corner in double precision. What a pixel covers of a texture comes from the exact
 //! change of the weights over one pixel to the right and one down.
 
-use crate::lens::{Lens, OnRays, Rays};
+use crate::affine::OnRays;
+use crate::lens::{Lens, Rays};
 use crate::model::{Model, Part};
 use crate::octet::Names;
 use glam::{DVec3, Vec2, Vec3, Vec4};

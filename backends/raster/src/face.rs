@@ -5,8 +5,9 @@
 //! Along the rays of a picture every linear function of a point is affine in column and row; a triangle is set
 //! up once for all pixels of a tile that show it.
 
+use crate::affine::OnRays;
 use crate::color::{Changes, ChangesAll, Spots, changes, changes_all, color_of_first};
-use crate::lens::{Lens, OnRays};
+use crate::lens::Lens;
 use crate::model::{Model, Part};
 use crate::octet::Names;
 use crate::tile::NO_TRIANGLE;

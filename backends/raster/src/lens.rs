@@ -1,5 +1,6 @@
 //! On which pixel does a point fall, and which ray goes through a place of the picture?
 
+use crate::affine::{Linear, OnRays, Row};
 use glam::{DAffine3, DMat3, DVec3};
 use polyptych_core::camera::{Camera, Projection};
 use polyptych_core::lanes::{DVec3x8, F64x8};
@@ -39,21 +40,6 @@ pub(crate) enum Rays {
     Parallel,
 }
 
-/// An affine function of a point.
-#[derive(Clone, Copy, Debug)]
-struct Row {
-    slope: DVec3,
-    offset: f64,
-}
-
-/// An affine function of a place in the picture, in pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Linear {
-    base: DVec3,
-    by_column: DVec3,
-    by_row: DVec3,
-}
-
 /// A point before division: column and row times `w`, and the distance ahead. `w` is the distance ahead for
 /// central rays and 1 for parallel ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,51 +55,6 @@ pub(crate) struct ScreenFromObject {
     column: Row,
     row: Row,
     ahead: Row,
-}
-
-/// A linear function of a point along the rays of a picture: the part that differs from ray to ray, affine in
-/// column and row, and the part that all share.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct OnRays {
-    base: f64,
-    pub(crate) by_column: f64,
-    pub(crate) by_row: f64,
-    shared: f64,
-}
-
-impl Row {
-    #[inline(always)]
-    fn at(&self, p: DVec3) -> f64 {
-        self.slope.dot(p) + self.offset
-    }
-
-    #[inline(always)]
-    fn at_all(&self, p: DVec3x8) -> F64x8 {
-        DVec3x8::splat(self.slope).dot(p) + F64x8::splat(self.offset)
-    }
-
-    /// Applies the function to points that an affine map places first.
-    fn after(&self, map: &DAffine3, origin: DVec3) -> Self {
-        Self {
-            slope: map.matrix3.transpose() * self.slope,
-            offset: self.slope.dot(map.translation - origin) + self.offset,
-        }
-    }
-}
-
-impl Linear {
-    #[inline(always)]
-    fn at(&self, x: f64, y: f64) -> DVec3 {
-        self.base + self.by_column * x + self.by_row * y
-    }
-}
-
-impl Linear {
-    #[inline(always)]
-    fn at_all(&self, x: F64x8, y: F64x8) -> DVec3x8 {
-        let (right, down) = (DVec3x8::splat(self.by_column), DVec3x8::splat(self.by_row));
-        DVec3x8::splat(self.base) + right.scaled(x) + down.scaled(y)
-    }
 }
 
 impl Lens {
@@ -322,37 +263,6 @@ impl Lens {
         match self.rays {
             Rays::Central => normal.dot(point) < 0.0,
             Rays::Parallel => normal.dot(self.direction.base) < 0.0,
-        }
-    }
-}
-
-impl OnRays {
-    /// Returns the function's value at the start of a ray and its change over the ray's direction.
-    #[inline(always)]
-    pub(crate) fn at(&self, rays: Rays, x: f64, y: f64) -> (f64, f64) {
-        let own = self.base + self.by_column * x + self.by_row * y;
-        match rays {
-            Rays::Central => (self.shared, own),
-            Rays::Parallel => (own, self.shared),
-        }
-    }
-}
-
-impl OnRays {
-    /// Returns by what it differs over one pixel to the right and one down, eight times.
-    #[inline(always)]
-    pub(crate) fn steps(&self) -> [F64x8; 2] {
-        [F64x8::splat(self.by_column), F64x8::splat(self.by_row)]
-    }
-
-    /// The same for eight rays.
-    #[inline(always)]
-    pub(crate) fn at_all(&self, rays: Rays, x: F64x8, y: F64x8) -> (F64x8, F64x8) {
-        let of = F64x8::splat;
-        let (own, shared) = (of(self.base) + of(self.by_column) * x + of(self.by_row) * y, of(self.shared));
-        match rays {
-            Rays::Central => (shared, own),
-            Rays::Parallel => (own, shared),
         }
     }
 }

@@ -6,6 +6,7 @@
 //!  model      meshes at their places, given or converted            (prepare)
 //!  shadow     what each light sees, drawn by the steps below        (prepare, when lights or things moved)
 //!  lens       camera -> rows that take points to pixels, and rays back
+//!  affine     the functions that these rows and rays are made of
 //!  transform  every vertex once -> column, row, depth
 //!  clip       what reaches behind the eye or beyond the guard band
 //!  sieve      eight triangles at once: which of them cover no pixel
@@ -44,6 +45,7 @@
 //! and weighs as many of the places in the pixel as show it. Edges are smooth; what is finer within a triangle
 //! (highlights, edges of shadows) is not. Coverage is the share of places that show something.
 
+mod affine;
 mod batch;
 mod bin;
 mod blank;

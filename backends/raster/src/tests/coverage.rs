@@ -1,7 +1,7 @@
 //! Is every pixel inside of a surface covered exactly once?
 
 use super::{Random, camera, draw, scene_of, triangle};
-use crate::edges::Spans;
+use crate::edges::{BLOCK, STRIP, Spans};
 use crate::grid::{TILE_WIDTH, TileGrid};
 use crate::setup::{Corners, DepthPlane, Record, ScreenPoint};
 use glam::Vec3;
@@ -23,17 +23,36 @@ fn count(width: u32, height: u32, triangles: &[[Corner; 3]]) -> Vec<u32> {
         };
         grid.for_each_touched(&record, |tile| {
             let area = grid.area(tile);
-            for span in Spans::of(&record, &area).iter() {
+            let spans = Spans::of(&record, &area);
+            let mut covered = Vec::new();
+            for span in spans.iter() {
                 for i in 0..span.length as i32 {
                     let inside =
                         (span.x + i - area.x) as usize + (span.y - area.y) as usize * TILE_WIDTH as usize;
                     assert_eq!(inside, span.first + i as usize);
+                    covered.push(inside);
                     hits[(span.y * width as i32 + span.x + i) as usize] += 1;
                 }
             }
+            assert_eq!(in_strips(&spans), covered);
         });
     }
     hits
+}
+
+/// Lists the pixels of a tile that are covered as strips tell it.
+fn in_strips(spans: &Spans) -> Vec<usize> {
+    let mut covered = Vec::new();
+    for strip in (0..spans.strips()).map(|index| spans.strip(index)) {
+        let [first, end] = strip.blocks;
+        for row in 0..STRIP {
+            for column in (0..strip.length[row]).map(|i| strip.begin[row] as usize + i as usize) {
+                assert!((first..end).contains(&(column / BLOCK)));
+                covered.push((strip.row + row) * TILE_WIDTH as usize + column);
+            }
+        }
+    }
+    covered
 }
 
 /// Tells on which side of a polygon of snapped corners a pixel's center is: 1 inside, 0 on its border, -1 outside.
