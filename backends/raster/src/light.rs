@@ -107,8 +107,11 @@ impl Illumination<'_> {
         let (mut casting, mut reaching, one) = (F32x8::ZERO, F32x8::ZERO, F32x8::splat(1.0));
         for (index, lamp) in self.lamps.iter().enumerate() {
             let arrivals = Arrivals::of(lamp, batch, origin);
+            let (casts, zero) = (lamp.light.casts_shadow, F64x8::splat(0.0));
+            let comes = arrivals.distance.above(zero) & used;
+            let faces_light = !turned_away_all(batch.true_normal, arrivals.to_light);
             // Asked for before the light is reckoned, read after it.
-            let shadows = self.shadows.filter(|_| lamp.light.casts_shadow && taking.any());
+            let shadows = self.shadows.filter(|_| casts && (comes & faces_light & taking).any());
             let from = shadows.map_or(DVec3::ZERO, |shadows| origin - shadows.origin);
             let place = batch.place + DVec3x8::splat(from);
             let aims = if let Some(shadows) = shadows { shadows.aim(index, place) } else { None };
@@ -117,9 +120,6 @@ impl Illumination<'_> {
                 None => self.added(batch, &arrivals),
                 Some(corners) => self.interpolated(batch, corners, index),
             };
-            let (casts, zero) = (lamp.light.casts_shadow, F64x8::splat(0.0));
-            let comes = arrivals.distance.above(zero) & used;
-            let faces_light = !turned_away_all(batch.true_normal, arrivals.to_light);
             let counts = if wants.shadow && casts { Mask8::ALL } else { is_not_black(added) };
             let mut arrives = comes & faces_light & counts;
             let crosses = if casts { arrives & taking } else { Mask8::NONE };

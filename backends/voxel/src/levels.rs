@@ -174,9 +174,8 @@ fn is_buried(voxels: &Voxels, first: [u32; 3]) -> bool {
             next[a] = to;
             let [cx, cy, cz] = per_axis;
             let is_there = next[0] < cx && next[1] < cy && next[2] < cz;
-            let index =
-                || (next[2] as usize * cy as usize + next[1] as usize) * cx as usize + next[0] as usize;
-            is_there && !matches!(voxels.chunk(index()), Chunk::Uniform(0) | Chunk::Cells(_))
+            is_there
+                && !matches!(voxels.chunk(voxels.index_of_chunk(next)), Chunk::Uniform(0) | Chunk::Cells(_))
         })
     })
 }

@@ -185,7 +185,7 @@ impl Voxels {
         if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] {
             return 0;
         }
-        match self.chunk(self.chunk_index(x, y, z)) {
+        match self.chunk(self.index_of_chunk([x, y, z].map(|c| c / CHUNK))) {
             Chunk::Uniform(value) => *value,
             Chunk::Cells(cells) => cells[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)],
         }
@@ -196,7 +196,8 @@ impl Voxels {
         if x >= self.size[0] || y >= self.size[1] || z >= self.size[2] || self.get(x, y, z) == value {
             return;
         }
-        self.cells_mut(self.chunk_index(x, y, z))[cell_index(x % CHUNK, y % CHUNK, z % CHUNK)] = value;
+        self.cells_mut(self.index_of_chunk([x, y, z].map(|c| c / CHUNK)))
+            [cell_index(x % CHUNK, y % CHUNK, z % CHUNK)] = value;
     }
 
     /// Returns the cells of a chunk to be changed: a copy, where a clone of the grid holds them, too.
@@ -209,8 +210,10 @@ impl Voxels {
         Arc::make_mut(cells)
     }
 
-    /// Returns the index of a chunk by its place among chunks.
-    pub(super) fn index_of_chunk(&self, [x, y, z]: [u32; 3]) -> usize {
+    /// Returns the number of a chunk among [`Voxels::chunks`] by its place among them.
+    #[must_use]
+    #[inline]
+    pub fn index_of_chunk(&self, [x, y, z]: [u32; 3]) -> usize {
         let (cx, cy) = (self.chunks_per_axis[0] as usize, self.chunks_per_axis[1] as usize);
         (z as usize * cy + y as usize) * cx + x as usize
     }
@@ -226,12 +229,6 @@ impl Voxels {
             "a chunk has {CHUNK_CELLS} cells"
         );
         *self.chunk_mut(index) = chunk;
-    }
-
-    #[inline]
-    fn chunk_index(&self, x: u32, y: u32, z: u32) -> usize {
-        let (cx, cy) = (self.chunks_per_axis[0] as usize, self.chunks_per_axis[1] as usize);
-        ((z / CHUNK) as usize * cy + (y / CHUNK) as usize) * cx + (x / CHUNK) as usize
     }
 
     /// Bounds the whole grid, empty cells included.

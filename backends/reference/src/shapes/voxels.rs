@@ -55,9 +55,7 @@ enum ChunkValue {
 
 fn chunk_value(voxels: &Voxels, cell: [i64; 3]) -> ChunkValue {
     let [x, y, z] = cell.map(|c| c as u32);
-    let [cx, cy, _] = voxels.chunks_per_axis().map(|c| c as usize);
-    let index = ((z / CHUNK) as usize * cy + (y / CHUNK) as usize) * cx + (x / CHUNK) as usize;
-    match voxels.chunk(index) {
+    match voxels.chunk(voxels.index_of_chunk([x, y, z].map(|c| c / CHUNK))) {
         Chunk::Uniform(0) => ChunkValue::Empty,
         _ => ChunkValue::Cell(voxels.get(x, y, z)),
     }
